@@ -345,20 +345,19 @@ def quantities(dimension: int) -> dict[str, tuple[str, float, float]]:
     }
 
 
-SOLID = {"displace": "amount", "frequency": "frequency", "thickness": "thickness", "width": "width"}
+SOLID = {"displace": "amount", "frequency": "frequency", "width": "width"}
 FROM_NOTHING = {"smooth", "blend", "displace", "frequency", "width", "texels"}  # the probe starts later
-UNBOUNDED = {"objects", "thin"}
-"""Quantities without a range where nothing was lost up to the last value: a warning would not say why.
-
-Nor has a scale a lower end where nothing was lost down to the first: thin objects are as small one way.
-"""
 BOTH_WAYS = {"twirl", "bend", "twist"}  # the range is the same on either side of 0
 
 
 def measured_ranges(
     found: Mapping[str, Any], dimension: int = 2
 ) -> tuple[dict[str, list[float]], dict[str, str]]:
-    """Ranges by quantity for a manifest's ``trained``, and lines about what lies beyond for ``measured``."""
+    """Ranges by quantity for a manifest's ``trained``, and lines about what lies beyond for ``measured``.
+
+    There is none where nothing was lost at the last value: a warning would not say why. Nor has a scale a
+    lower end where nothing was lost at the first: thin objects are as small one way.
+    """
     ranges: dict[str, list[float]] = {}
     lines: dict[str, str] = {}
     for quantity, (name, low_unit, high_unit) in quantities(dimension).items():
@@ -367,7 +366,7 @@ def measured_ranges(
             continue
         rows = probe["rows"]
         first, last = _healthy(rows, probe["healthy"])
-        if quantity in UNBOUNDED and last == len(rows) - 1:
+        if last == len(rows) - 1:
             continue
         low, high = rows[first]["value"] * low_unit, rows[last]["value"] * high_unit
         low = 0.0 if quantity in FROM_NOTHING or (quantity == "scale" and first == 0) else low

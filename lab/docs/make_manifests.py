@@ -17,7 +17,7 @@ from typing import Any
 
 from lab import RESULTS
 from lab.sets.scenes import sets_of
-from lab.stability import UNBOUNDED, measured_ranges
+from lab.stability import measured_ranges
 from scenelang.compiler.manifest import ROOT, Manifest, available, load_manifest
 from scenelang.drawing.metrics import MOST_DB
 
@@ -48,8 +48,7 @@ def manifest(name: str) -> dict[str, Any]:
     suite = RESULTS / ("stability.json" if name == BASE else f"stability-{name}.json")
     if suite.exists():
         ranges, lines = measured_ranges(json.loads(suite.read_text("utf-8")), data["dimension"])
-        bounded = {name: v for name, v in data["trained"].items() if name in ranges or name not in UNBOUNDED}
-        data["trained"] = bounded | ranges  # a suite may be of few probes
+        data["trained"] |= ranges  # a suite may be of few probes, and some ranges have other measurements
         data["measured"]["stability"] = lines
     return data
 

@@ -3,6 +3,8 @@
 from __future__ import annotations
 
 import os
+import sys
+import tempfile
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import suppress
 from pathlib import Path
@@ -10,8 +12,9 @@ from typing import TYPE_CHECKING, Final
 
 import click
 
+from scenelang.assets.files import write_output
 from scenelang.cli.main import describe
-from scenelang.cli.say import say_trouble
+from scenelang.cli.say import STDOUT, say_trouble
 
 if TYPE_CHECKING:
     from scenelang.drawing.image import Output
@@ -52,6 +55,33 @@ def _walk(paths: Iterable[str], lost: list[OSError]) -> Iterator[str]:
         yield from _walk(inner, lost)
 
 
+def streamed(ctx: click.Context, out: str, suffix: str) -> str:
+    """The file to write where ``out`` is standard output, a pipe or a device, to which it is handed on whole.
+
+    Any other ``out`` unchanged. Raises `click.UsageError` for standard output that is a terminal.
+    """
+    if out not in STDOUT and (not os.path.exists(out) or os.path.isfile(out) or os.path.isdir(out)):
+        return out
+    if out in STDOUT and sys.stdout.isatty():
+        raise click.UsageError("standard output is a terminal, which shows no such data; name a file.")
+    file = Path(ctx.with_resource(tempfile.TemporaryDirectory()), f"stdout{suffix}")
+    ctx.meta[str(file)] = "standard output" if out in STDOUT else out
+
+    @ctx.call_on_close
+    def hand_on() -> None:
+        if file.exists():
+            data = file.read_bytes()
+            click.echo(data, nl=False) if out in STDOUT else write_output(out, data)
+
+    return str(file)
+
+
+def shown(path: str | os.PathLike[str]) -> str:
+    """The name of an output in messages: a stream's own in place of the file that is handed on to it."""
+    name = os.fspath(path)
+    return str(click.get_current_context().meta.get(name, name))
+
+
 def stem_of(name: str) -> str:
     """The stem of names of files that are made from a scene."""
     return "stdin" if name == STDIN else Path(name).stem
@@ -70,7 +100,9 @@ def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
             _check_format(path, suffix)
         except ValueError as error:
             advice = f"{what} has a suffix such as {suffix}, a folder ends in a slash"
-            raise click.UsageError(f"cannot write `{out}`: {error if path.suffix else advice}.") from None
+            raise click.UsageError(
+                f"cannot write `{shown(out)}`: {error if path.suffix else advice}."
+            ) from None
         if not path.parent.is_dir():
             raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
         return [path]
@@ -83,7 +115,7 @@ def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
             what = "an animation" if is_animation(out) else what
             if what != "an animation":
                 _check_format(path, suffix)
-            raise click.UsageError(f"`{out}` names {what}; {len(names)} scenes need a folder.")
+            raise click.UsageError(f"`{shown(out)}` names {what}; {len(names)} scenes need a folder.")
     files = [composed(path / f"{stem_of(name)}{suffix}") for name in names]
     owner: dict[str, str] = {}
     for name, file in zip(names, files, strict=True):

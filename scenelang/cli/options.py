@@ -13,7 +13,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import click
 
 from scenelang.assets.records import Record
-from scenelang.cli.files import stem_of
+from scenelang.cli.files import stem_of, streamed
 from scenelang.drawing.how import CHOICES, HELP, How
 
 if TYPE_CHECKING:
@@ -86,9 +86,19 @@ def text(name: str, metavar: str, help: str, **more: Any) -> Option:
     return click.option(name, metavar=metavar, help=help, **more)
 
 
-def writes(metavar: str, help: str) -> Option:
-    """The option that says where a command writes to."""
-    return click.option("-o", "--out", required=True, metavar=metavar, help=help)
+def writes(metavar: str, help: str, suffix: str | None = None, *, required: bool = True) -> Option:
+    """The option that says where a command writes to; files of the suffix go to standard output too."""
+
+    def place(ctx: click.Context, param: click.Parameter, out: str | None) -> str | None:
+        given = ctx.params.get("format")
+        if suffix is None or out is None:
+            return out
+        file = streamed(ctx, out, f".{given}" if given else suffix)
+        if given and file == out:
+            raise click.UsageError(f"--format is for standard output; `{out}` says its format by its suffix.")
+        return file
+
+    return click.option("-o", "--out", required=required, metavar=metavar, help=help, callback=place)
 
 
 def choice(*names: str, words: str, help: str) -> Option:

@@ -22,6 +22,7 @@ from scenelang.language.reports import WIDTH, paint, printable, render_text
 if TYPE_CHECKING:
     from rich.progress import Progress
 
+STDOUT = "-", "/dev/stdout"  # names of standard output where a command writes to a file
 _DIFF_STYLES = {"-": "removed", "+": "added", "@": "frame"}
 
 
@@ -53,7 +54,7 @@ def say_trouble(message: str) -> None:
 
 def put_out(result: str | bytes, out: str | None) -> None:
     """Write a command's result to a file, whole or not at all; ``-`` or None is standard output."""
-    if out is None or out == "-":
+    if out is None or out in STDOUT:
         click.echo(result, nl=False)
         return
     write_output(out, result.encode() if isinstance(result, str) else result)
@@ -74,12 +75,13 @@ def show_difference(name: str, before: str, after: str, color: str = "auto") -> 
     from difflib import unified_diff
 
     painted = wants_color(sys.stdout, color)
+    end = "\r" if "\r\n" in before and "\r\n" in after else ""  # the same on both sides: nothing to show
     # text after the last line feed is a line unless it is empty
     one, other = (re.findall(r"[^\n]*\n|[^\n]+", text) for text in (before, after))
     for line in unified_diff(one, other, name, name):
         style = "bold" if line.startswith(("--- ", "+++ ")) else _DIFF_STYLES.get(line[:1], "")
         text = line.removesuffix("\n")
-        safe = printable(text) if painted or sys.stdout.isatty() else text
+        safe = printable(text.removesuffix(end)) if painted or sys.stdout.isatty() else text
         click.echo(paint(style, safe, painted), color=True)
         if text == line:
             click.echo("\\ No newline at end of file")

@@ -229,7 +229,10 @@ class _Lowering(Record, frozen=False):
         element, model = known.get(name), f"model `{self.manifest.name}`"
         if element is not None and element.kind not in self.manifest.elements:
             kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
-            self.say(code, f"{model} does not draw `{name}`, {kind}", node)
+            help = "a scene is flat or solid; letters and drawings are of flat ones, meshes of solid ones"
+            if element.dimension == self.space.dimension:
+                help = "without a `model` line the usual model draws it"
+            self.say(code, f"{model} does not draw `{name}`, {kind}", node, help)
         elif element is None and name.partition(".")[0] in self.brought.unread:
             self.say("E0214", f"the file of `{name}` has not been read", node, "load the scene with a root")
         elif element is None:

@@ -6,7 +6,7 @@ from collections.abc import Callable, Collection, Sequence
 from functools import partial
 from itertools import product
 from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
-from operator import attrgetter, itemgetter
+from operator import itemgetter
 from typing import Final, NamedTuple
 
 from scenelang.assets.element import Element
@@ -121,6 +121,7 @@ _SUBJECTS = {
     "scale": ("W0504", "a scale of {value} of {name}"),
     "thin": ("W0506", "{name}, {value} times as long as wide,"),
     "thickness": ("W0506", "{name}, {value} thick,"),
+    "wall": ("W0506", "{name}, {value} thick,"),
     "texels": ("W0511", "a texture of {value} texels to a pixel on {name}"),
     "level": ("W0513", "an edge of {name} at {value} from that of its leaf"),
 }
@@ -146,8 +147,9 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     """Warn once for each quantity outside its trained or measured range, at the object furthest out.
 
     Deformations are measured in the normal form; the scale of an object is each of the two stretches of its
-    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest; texels
-    are counted where they are densest, of a solid at its centre. Before: STREAM. After: unchanged.
+    affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest, of what
+    does not run out to a rim a wall; a view reaches from the target to the canvas's nearest edge; texels are
+    counted where they are densest, of a solid at its centre. Before: STREAM. After: unchanged.
     """
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
@@ -158,9 +160,11 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
             if exact and quantity in ("scale", "thin"):
                 continue
-            if quantity in trained and not (quantity == "thickness" and cuts):
+            if quantity in trained and not (quantity in ("thickness", "wall") and cuts):
                 low, high = trained[quantity]
-                above = value - high if quantity != "thickness" else 0.0  # of which more does no harm
+                above = (
+                    0.0 if quantity in ("thickness", "wall") else value - high
+                )  # of which more does no harm
                 excess = max(low - value, above) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))
@@ -171,17 +175,20 @@ def check_trained(graph: Graph, context: Context) -> Graph:
             said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, code, quantity, f"{said} is", leaf, value, others)
-    widest = max((row for row in rows if row.op != "union"), key=attrgetter("k"), default=None)
-    if widest is not None and "width" in trained and widest.k > trained["width"][1]:
-        _warn(context, "W0512", "width", f"a `{widest.op}` of width {widest.k:.3g} is", widest.leaf)
     smooth = [row.leaf for row in rows if row.op == "smooth"]
     if "smooth" in trained and len(smooth) > trained["smooth"][1]:
         _warn(context, "W0505", "smooth", f"{len(smooth):,} smooth unions are", smooth[-1])
-    if smooth and "blend" in trained:
-        _check_blends(rows, measures, context)
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
         _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
+    view = "view cut" if any(row.cuts or row.op == "subtract" for row in rows) else "view"
+    if rows and graph.stage is not None and view in trained:
+        camera = graph.stage.camera
+        reach = dist(camera.eye, camera.target) * tan(camera.fov_rad / 2)
+        if not trained[view][0] <= reach <= trained[view][1]:
+            _warn(
+                context, "W0515", view, f"a view of {reach:.3g} from its middle to its edge is", rows[0].leaf
+            )
     if graph.stage is not None and graph.stage.sky is not None and context.whole:
         _check_light(rows, measures, graph, graph.stage, context)
     return graph
@@ -196,7 +203,7 @@ def _check_light(
     """
     space, found = graph.space, list[tuple[Leaf, str]]()
     hollow = [row.leaf for row in rows if not row.cuts and Skin.of(row.leaf.steps).shell]
-    walls = [(dict(leaf.noted("measures", measures)).get("thickness", inf), leaf) for leaf in hollow]
+    walls = [(dict(leaf.noted("measures", measures)).get("wall", inf), leaf) for leaf in hollow]
     thin = [(thick, leaf) for thick, leaf in walls if thick < THIN_WALL]
     cuts = [row for row in rows if row.cuts or row.op == "intersect"]
     for thick, leaf in thin if len(thin) * len(cuts) <= _TESTS else ():
@@ -326,30 +333,6 @@ def _within(box: Box, p: Point) -> bool:
     return overlap(box, (x, y, x, y, z, z))
 
 
-def _check_blends(rows: list[Row], measures: Callable[[Leaf], Measures], context: Context) -> None:
-    """Warn of the `smooth` with the largest product of its colours' difference and its scale.
-
-    An error of distances, as a share of the scale, is one of the colour by that share of the difference.
-    """
-    low, high, largest = [1.0] * 3, [0.0] * 3, 0.0
-    worst: tuple[float, float, float, Leaf] | None = None
-    for op, leaf, *_, cuts in rows:
-        if cuts or op == "intersect":
-            continue
-        largest = max(largest, leaf.noted("measures", measures)[0][1])
-        rgb = leaf.look.colour()
-        dark = rgb if leaf.look.element is None else (0.0, 0.0, 0.0)  # a texture may have any colour
-        low, high = list(map(min, low, dark)), list(map(max, high, rgb))
-        if op == "smooth":
-            contrast = max(max(c - a, b - c) for a, b, c in zip(low, high, rgb, strict=True))
-            if worst is None or contrast * largest > worst[0]:
-                worst = contrast * largest, contrast, largest, leaf
-    if worst is not None and worst[0] > context.manifest.trained["blend"][1]:
-        product, contrast, scale, leaf = worst
-        said = f"a `smooth` of colours {contrast:.2g} apart at a scale of {scale:.3g}"
-        _warn(context, "W0507", "blend", f"{said}: the product {product:.3g} is", leaf)
-
-
 def _measures(leaf: Leaf, space: Space) -> Measures:
     smallest, largest = space.stretches(steps.composed(leaf.steps))
     result = [("scale", smallest), ("scale", largest)]
@@ -359,7 +342,8 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
     if leaf.look.material == "diffuse":
         grown = skin.grow if skin.order & 1 or not skin.shell else 0.0
         least = skin.shell or (row.thickness if row else inf)
-        result.append(("thickness", smallest * (least + 2 * grown)))
+        even = skin.shell or leaf.geometry in ("box", "cylinder")  # as thick all over
+        result.append(("wall" if even else "thickness", smallest * (least + 2 * grown)))
     if skin.grow or skin.shell:
         result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:

@@ -88,6 +88,7 @@ def compare(picture: Array, reference: Array) -> dict[str, float]:
 def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = False) -> Image:
     """Network, reference and FLIP map in a row, with a line of text above (H + 14, 3 W + 8, 3), or two lines.
 
+    Of pictures narrower than their captions the columns stand apart by these, and the sheet holds the label.
     If ``plain``, eight times how far each channel is off in place of the map, which needs the extra ``eval``.
     """
     far = ("8 × difference", np.clip(8 * np.abs(picture - reference), 0, 1)) if plain else None
@@ -98,11 +99,13 @@ def side_by_side(picture: Array, reference: Array, label: str, *, plain: bool = 
     ]
     height, width = reference.shape[:2]
     top = TEXT if width >= WIDE else 2 * TEXT
-    sheet = pillow.new("RGB", (3 * width + 2 * GAP, top + height), "white")
+    wide = ImageDraw.Draw(pillow.new("RGB", (1, 1))).textlength
+    step = GAP + max(width, *(2 + math.ceil(wide(name)) for name, _ in parts))
+    sheet = pillow.new("RGB", (max(3 * step - GAP, 4 + math.ceil(wide(label))), top + height), "white")
     pen = ImageDraw.Draw(sheet)
     pen.text((2, 1), f"network {label}" if top == TEXT else label, fill="black")
     for column, (name, part) in enumerate(parts):
-        left = column * (width + GAP)
+        left = column * step
         sheet.paste(np.asarray(part, np.float32).view(Image).to_pil(), (left, top))
         if column or top > TEXT:
             pen.text((left + 2, 1 + top - TEXT), name, fill="black")

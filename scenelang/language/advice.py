@@ -228,7 +228,7 @@ def _advice(name: tree.Name, place: Site, call: tree.CallExpr | None) -> Advice:
     if help is None and colour is not None:
         fix = Fix(f"write `{colour}`", (Edit(span, colour),))
         return f"colours have no names; {lower} is {colour}", fix
-    return help, fix
+    return help or (f"there is {listing(words.FUNCTIONS)}" if call else None), fix
 
 
 def report_problem(

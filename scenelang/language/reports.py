@@ -279,7 +279,7 @@ def _preview(fix: Fix, gutter: int, width: int, color: bool) -> list[str]:
             at = edit.span.end - start
         new += old[at:]
         if all(edit.span.start == edit.span.end and "\n" not in edit.replacement for edit in own):
-            row = _Row(new.removesuffix("\n"), marks[0][0], marks[-1][1], width)
+            row = _Row(new.removesuffix("\n").removesuffix("\r"), marks[0][0], marks[-1][1], width)
             places = [(max(row.cell(a), 0), min(row.cell(b), row.size), "+", "added") for a, b in marks]
             under = _underlines([place for place in places if place[0] < place[1]], color)
             head = paint("frame", f"{first:>{gutter}} |", color)

@@ -656,6 +656,9 @@ def _advice(stmt: tree.Call, place: Site) -> Advice:
     help = help or foreign.STATEMENTS.get(text.lower())
     if help is None and place.kind in ("file", "group", "chain"):
         help = advice.drawn(place)
+    there = {"material": words.OPERATIONS, "object": words.TRANSFORMS}.get(place.kind)
+    if help is None and there and stmt.args is not None:
+        help = f"there is {listing(there)}"
     return help, fix
 
 

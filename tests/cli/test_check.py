@@ -253,5 +253,7 @@ def test_the_diff_is_a_patch(folder: Folder) -> None:
             command = ["patch", "-p0", "--binary", "-o", "patched.nsg"]
             done = subprocess.run(command, input=shown, cwd=folder.path, capture_output=True, check=False)
             assert (done.returncode, folder.read("patched.nsg")) == (0, fixed), done.stdout
+        coloured = folder.run("check", "a.nsg", "--diff", "--color", "always").stdout
+        assert coloured.count("\ufffd") == 4  # no end of a line
         folder.run("check", "a.nsg", "--fix", code=0)
         assert folder.read("a.nsg") == mark + fixed

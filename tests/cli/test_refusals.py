@@ -80,6 +80,11 @@ dump wrong.nsg -o b.dot                            | 1 | E0201
 dump wrong.nsg --costs                             | 1 | E0201
 convert a.nsg -o a.py                              | 2 | --to nsg or json
 export a.nsg -o a.png                              | 2 | a page's file ends in .html
+render a.nsg -o - --format foo                     | 2 | cannot write `standard output`: no image format
+render a.nsg -o a.png --format png                 | 2 | --format is for standard output
+render a.nsg a.nsg -o -                            | 2 | `standard output` names a picture
+render a.nsg -o - --output alpha                   | 2 | standard output takes them as exr
+render wrong.nsg -o -                              | 1 | E0201
 export a.nsg -o a                                  | 2 | a page has a suffix such as .html
 export a.nsg -o no/a.html                          | 2 | no folder
 export a.nsg a.nsg -o out --title T                | 2 | --title is of one page

@@ -108,6 +108,39 @@ def test_one_scene(folder: Folder) -> None:
     assert os.listdir("new") == ["a.png"]
 
 
+def test_standard_output_takes_what_a_file_would(folder: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
+    name, film = folder.write("a.nsg", "canvas(16, 16);" + GOOD), folder.write("film.nsg", MOVING)
+    for command, suffix, form in (
+        (f"render {name}", "png", ""),
+        (f"render {name} -v", "jpg", "--format .JPG"),
+        (f"render {name}", "svg", "--format svg"),
+        (f"render {film} --frames 0..1", "gif", "--format gif"),
+        (f"compile {name} -v", "safetensors", ""),
+        (f"export {name} --title T", "html", ""),
+    ):
+        folder.run(*command.split(), "-o", f"file.{suffix}", code=0)
+        for out in ("-", "/dev/stdout"):
+            sent = folder.run(*command.split(), "-o", out, *form.split(), code=0)
+            assert sent.stdout_bytes == Path(f"file.{suffix}").read_bytes(), command
+            assert ("standard output" in sent.stderr) == ("-v" in command or suffix == "gif")
+    wrong = folder.write("wrong.nsg", "star { sclae(1); }")
+    assert folder.run("render", wrong, "-o", "-", code=1).stdout_bytes == b""
+    monkeypatch.setattr("click.testing._NamedTextIOWrapper.isatty", lambda self: True, raising=False)
+    assert "is a terminal" in folder.run("render", name, "-o", "-", code=2).stderr
+
+
+@pytest.mark.skipif(sys.platform == "win32", reason="no named pipes")
+def test_devices_and_pipes_take_what_a_file_would(folder: Folder) -> None:
+    name = folder.write("a.nsg", "canvas(16, 16);" + GOOD)
+    folder.run("render", name, "-o", "file.png", code=0)
+    os.mkfifo("pipe")
+    end = os.open("pipe", os.O_RDWR)
+    folder.run("render", name, "-o", "pipe", code=0)
+    assert os.read(end, 1 << 16) == Path("file.png").read_bytes()
+    os.close(end)
+    folder.run("render", name, "-o", os.devnull, code=0)
+
+
 def test_formats_and_sizes(folder: Folder) -> None:
     name = folder.write("a.nsg", "background(none);" + GOOD)
     for suffix, channels in (("png", 4), ("jpg", 3), ("webp", 4), ("TIFF", 4)):

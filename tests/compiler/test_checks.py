@@ -57,14 +57,6 @@ def test_on_both_sides_of_a_bound() -> None:
         ("star { scale(1, 0.2); }", "star { scale(1, 0.19); }", "W0506 `star`, 5.26 times as long as wide,"),
         (stars(3), stars(4), "W0501 4 objects are outside the measured range 1 to 3"),
         (blend(DARK, DARK), "smooth { star { } square { } pentagon { } }", "W0505 2 smooth unions are"),
-        (blend(DARK, "material flat { color([0.7, 0.7, 1]); }"), blend(DARK, "scale(0.9);"),
-            "W0507 a `smooth` of colours 0.8 apart at a scale of 1: the product 0.8 is outside the measured"),
-        (blend(DARK + "scale(0.6);", "scale(0.5);"), blend(DARK + "scale(0.6);", "scale(1.5, 0.8);"),
-            "W0507 a `smooth` of colours 0.8 apart at a scale of 0.8: the product 0.64"),
-        (f"subtract {{ {blend('', '')} pentagon {{ {DARK} }} }}", blend("", DARK), "W0507"),
-        (f"star {{ {DARK} }} square {{ }}",
-            f"smooth {{ union {{ star {{ {DARK} }} square {{ rotate(0.1rad); }} }} pentagon {{ }} }}",
-            "W0507 a `smooth` of colours 0.8 apart"),
     ):  # fmt: skip
         assert warned(inside) == []
         (found,) = warned(outside)
@@ -96,7 +88,7 @@ SOLIDS = dataclasses.replace(
     load_manifest("solids3d"),
     trained={
         "twist": (-2, 2), "bend": (-1, 1), "displace": (0, 0.1), "frequency": (0, 9), "scale": (0.1, 2),
-        "thickness": (0.12, 1), "width": (0, 1),
+        "thickness": (0.12, 1), "wall": (0.1, 1), "view": (0.1, 600), "view cut": (0.25, 600),
     },
     measured={},
 )  # fmt: skip
@@ -112,12 +104,26 @@ def test_bounds_of_solids() -> None:
         ("scale(1, 0.2, 1);", FLAT, "W0506 `torus`, 0.114 thick, is outside the measured range 0.12 to 1"),
         (f"{FLAT} {MIST}", f"{MIST} }} torus {{ {FLAT}", "W0506 `torus`, 0.114 thick,"),
         (f"}} subtract torus {{ {FLAT}", f"}} torus {{ {FLAT}", "W0506"),
-        ("} smooth(k = 1) sphere {", "} smooth(k = 1.1) sphere {", "W0512 a `smooth` of width 1.1 is"),
+        ("scale(1); } box { scale(1, 0.1, 1);", "} cylinder { shell(0.09);", "W0506 `cylinder`, 0.09 thick"),
+        ("shell(0.1);", "shell(0.09);", "W0506 `torus`, 0.09 thick"),
         ("bend(1); scale(2);", "bend(1); scale(1, 1, 2.1);", "W0504 a scale of 2.1 of `torus`"),
     ):  # fmt: skip
         assert warned(f"chain {{ torus {{ {inside} }} }}", SOLIDS) == []
         (found,) = warned(f"chain {{ torus {{ {outside} }} }}", SOLIDS)
         assert found.startswith(words)
+
+
+def test_views_of_solids() -> None:
+    """From the target to the nearest edge of the canvas: 0.1 is a tenth of a default view and more."""
+    for cut, low in ((False, 0.1), (True, 0.25)):
+        for view, found in ((low - 0.01, True), (low + 0.01, False), (599, False), (601, True)):
+            text = (
+                f"camera([0, 0, {view}], target = [0, 0, 0], fov = 90deg); {'subtract' if cut else 'union'}"
+            )
+            said = warned(
+                f"{text} {{ sphere {{ scale(0.02); }} sphere {{ scale(0.015, 1, 0.015); }} }}", SOLIDS
+            )
+            assert [line.startswith("W0515 a view of ") for line in said if "W0515" in line] == [True] * found
 
 
 def test_crowds_and_hairlines_are_drawn_well_and_not_warned_of() -> None:
@@ -263,7 +269,7 @@ LATER = [
         ["E0409 20"],
         ["E0409 14"],
     ),
-    ("star { scale(0.3); twirl(20 * u); }", ["W0502 20"], ["W0502 16"]),
+    ("box { scale(0.3); twirl(416.6 * u); }", ["W0502 20"], ["W0502 16"]),
 ]
 
 

@@ -30,7 +30,7 @@ def test_damaged_manifests() -> None:
     changes = (
         (b'"format": 1', b'"format": 2'),
         (b'"renderer"', b'"drawer"'),
-        (b'"twirl": [', b'"twirl": [1, '),
+        (b'"texels": [', b'"texels": [1, '),
     )
     for damaged in (b"", b"[]", b"\xff", data[:-100], *(data.replace(*change) for change in changes)):
         with pytest.raises(ValueError, match="not a model manifest of format 1"):

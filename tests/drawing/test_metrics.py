@@ -44,6 +44,11 @@ def test_flip_map_is_where_the_error_is() -> None:
 @pytest.mark.parametrize("side", [64, 128])
 def test_names_stand_above_their_own_pictures(side: int) -> None:
     grey = np.full((side, side, 3), 0.5, np.float32)
+    small = np.full((8, 8, 3), 0.5)
+    sheet = (np.asarray(side_by_side(small, small, "PSNR 50.00 dB  SSIM 1.0000")) < 0.3).any(-1)
+    inked = sheet[TEXT : 2 * TEXT].any(0)  # gaps of three columns at least are between captions alone
+    assert len("".join("#" if ink else " " for ink in inked).strip().split("   ")) >= 3
+    assert not sheet[:TEXT, -3:].any()  # nor is the label cut
     row = side_by_side(grey, grey, "#12 34.5 dB")
     names = row[-side - TEXT : -side].min(axis=(0, 2))
     for column in (1, 2):

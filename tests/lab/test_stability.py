@@ -174,12 +174,14 @@ def test_a_range_ends_where_the_error_begins_to_show() -> None:
         ({"objects": probe(4, v1=50, v4=50, v16=40.1, v32=39.9, v64=50)}, {"objects": [1, 16]},
          {"objects": "32: 39.9 dB (worst 38.9), 64: 50.0 dB (worst 49.0)"}),
         ({"objects": probe(4, v1=50, v4=50, v64=49.6), "thin": probe(3, v1=50, v3=50, v300=45.7)}, {}, {}),
-        ({"blends": probe(4, v1=50, v4=47, v64=41.2)}, {"smooth": [0, 64]}, {}),
-        ({"size": probe(1, v0_1=50, v1=50, v4=50)}, {"scale": [0, 2.2]}, {}),
+        ({"blends": probe(4, v1=50, v4=47, v64=41.2)}, {}, {}),
+        ({"size": probe(1, v0_1=50, v1=50, v4=50)}, {}, {}),
         ({"blends": probe(2, v1=20.5, v2=20, v4=19.2, v8=18.9)}, {"smooth": [0, 4]},
          {"smooth": "8: 18.9 dB (worst 17.9)"}),
-        ({"size": probe(1, v0_1=39, v0_5=50, v1=50, v2=50, v4=30), "warp": probe(1, v0_5=50, v1=50, v2=50)},
+        ({"size": probe(1, v0_1=39, v0_5=50, v1=50, v2=50, v4=30),
+          "warp": probe(1, v0_5=50, v1=50, v2=50, v3=30)},
          {"scale": [0.1, 1.1], "twirl": [-1.6, 1.6], "bend": [-1.6, 1.6]},
-         {"scale": "0.02: 39.0 dB (worst 38.0), 2.2: 30.0 dB (worst 29.0)"}),
+         {"scale": "0.02: 39.0 dB (worst 38.0), 2.2: 30.0 dB (worst 29.0)",
+          "twirl": "2.4: 30.0 dB (worst 29.0)", "bend": "2.4: 30.0 dB (worst 29.0)"}),
     ):  # fmt: skip
         assert measured_ranges({"probes": probes}) == (ranges, lines)

@@ -362,6 +362,25 @@ def test_words_of_other_languages_lead_to_words_of_this_one() -> None:
     assert not set(foreign.FUNCTIONS) & set(FUNCTIONS)
 
 
+HELPED = {
+    "star { shadow(0.1); }": "in the plane draw the object twice",
+    "sphere { blur(3); }": "nothing is blurred",
+    "sphere { material glossy { ior(1.5); } }": "light is not bent",
+    'let a = format("x", 2); star;': "strings are not put together",
+    "star { keyframe(2); }": "there is bend, displace, grow, matrix, rotate, scale, shear,",
+    "star { material flat { bloom(2); } }": "there is color, density, flip, glow, grayscale,",
+    "let a = debug(2); star;": "there is abs, acos, asin,",
+    'import "std/letters" as abc; sphere; abc.text("Ag");': "letters and drawings are of flat ones",
+    'import "std/letters" as abc; model "shapes2d-reading"; canvas(64, 64); abc.text("A");': "the usual",
+}
+
+
+def test_what_is_unknown_has_help() -> None:
+    for text, words in HELPED.items():
+        found = [d.help or "" for d in nsg.check_text(text) if d.code[0] == "E"]
+        assert [words in help for help in found] == [True], text
+
+
 def test_a_syntax_mistake_has_no_consequences() -> None:
     for text in (
         "let = 0.5;\nsquare { scale(size); }",  # the name is lost

@@ -310,6 +310,9 @@ def test_an_insertion_shows_the_new_line() -> None:
         "1 | aa * 2 + bb - cc;",
         "  |    +++          +",
     ]
+    source = SourceFile("a.nsg", "aa\r\nbb\r\n")
+    found = Diagnostic("E0101", "m", None, fix=Fix("end it", (Edit(Span(source, 2, 2), ";"),)))
+    assert "1 | aa;\n" in render_text([found])
 
 
 def test_a_replacement_shows_both_lines() -> None:

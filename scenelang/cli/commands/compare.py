@@ -8,21 +8,21 @@ from pathlib import Path
 import click
 
 from scenelang.cli import options
-from scenelang.cli.files import composed, stem_of
+from scenelang.cli.files import composed, shown, stem_of
 from scenelang.cli.say import Bar, need_metrics
 from scenelang.drawing.how import How
 
 
 @click.command("compare")
 @click.argument("scene", metavar="SCENE")
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), help="Picture to write; by default SCENE-compare.png."
+@options.writes(
+    "OUT", "Picture to write; by default SCENE-compare.png, - is standard output.", ".png", required=False
 )
 @options.request()
 @options.originals
 @options.drawing("device", "threads")
 @click.pass_context
-def command(ctx: click.Context, scene: str, out: Path | None, request: options.Request, how: How) -> None:
+def command(ctx: click.Context, scene: str, out: str | None, request: options.Request, how: How) -> None:
     """Draw SCENE with the network and exactly, and show where they differ.
 
     The exact picture takes longer than the network's, of solids minutes. Prints PSNR (at most 50 dB), SSIM
@@ -31,7 +31,7 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: options.R
     from scenelang.cli.inputs import prepare_scene
 
     need_metrics()
-    target = out if out is not None else composed(Path(f"{stem_of(scene)}-compare.png"))
+    target = composed(Path(f"{stem_of(scene)}-compare.png")) if out is None else Path(out)
     job = prepare_scene(scene, request)
     if job.program is None or job.scene is None or job.failed():
         ctx.exit(1)
@@ -46,4 +46,4 @@ def command(ctx: click.Context, scene: str, out: Path | None, request: options.R
     figures = compare(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
     side_by_side(picture, exact, text).save(target)
-    click.echo(f"{text}  {target}")
+    click.echo(f"{text}  {shown(target)}", err=shown(target) != str(target))

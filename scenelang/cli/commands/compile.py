@@ -5,13 +5,13 @@ from __future__ import annotations
 import click
 
 from scenelang.cli import options
-from scenelang.cli.files import PROGRAM
+from scenelang.cli.files import PROGRAM, shown
 from scenelang.cli.say import Clock
 
 
 @click.command("compile")
 @click.argument("file", metavar="FILE")
-@options.writes("OUT", "Program to write, .safetensors.")
+@options.writes("OUT", "Program to write, .safetensors; - is standard output.", PROGRAM)
 @options.request()
 @options.strict
 @options.verbose
@@ -34,4 +34,4 @@ def command(
     with clock("save"):
         job.program.save(out)
     if verbose:
-        click.echo("\n  ".join([f"{file} -> {out}", *job.notes]) + f"\n{clock.report()}", err=True)
+        click.echo("\n  ".join([f"{file} -> {shown(out)}", *job.notes]) + f"\n{clock.report()}", err=True)

@@ -6,13 +6,13 @@ import click
 
 from scenelang.assets.files import write_output
 from scenelang.cli import options
-from scenelang.cli.files import PAGE, stem_of, targets
+from scenelang.cli.files import PAGE, shown, stem_of, targets
 from scenelang.cli.say import Clock, say_trouble
 
 
 @click.command("export")
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@options.writes("OUT", "Page (.html) or folder to write.")
+@options.writes("OUT", "Page (.html) or folder to write; - is standard output.", PAGE)
 @click.option("--title", metavar="TEXT", help="Title of the page; by default the name of the file.")
 @options.request()
 @options.strict
@@ -63,7 +63,9 @@ def command(
             text = page(view, still=picture).encode()
             write_output(path, text)
         if verbose:
-            click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes, f"{len(text):,} bytes"]), err=True)
+            click.echo(
+                "\n  ".join([f"{job.name} -> {shown(path)}", *job.notes, f"{len(text):,} bytes"]), err=True
+            )
     if verbose:
         click.echo(clock.report(), err=True)
     ctx.exit(code)

@@ -12,7 +12,7 @@ from click.core import ParameterSource
 
 from scenelang.assets.files import write_output
 from scenelang.cli import options
-from scenelang.cli.files import DRAWING, PROGRAM, SHAPES, check_outputs, targets
+from scenelang.cli.files import DRAWING, PROGRAM, SHAPES, check_outputs, shown, targets
 from scenelang.cli.main import Trouble, describe
 from scenelang.cli.say import Bar, Clock, say_diagnostics
 from scenelang.drawing.how import How, threads_for
@@ -36,7 +36,9 @@ _SECTIONS: Final = {
     "Meshes": "--resolution --up",
 }
 
-_OF_SHAPES: Final = ("files", "out", "defines", "frame", "model", "root", "backend", "strict", "verbose")
+_OF_SHAPES: Final = (
+    "files", "out", "format", "defines", "frame", "model", "root", "backend", "strict", "verbose"
+)  # fmt: skip
 """Parameters that shapes have too."""
 
 _OF_MESHES: Final = ("resolution", "up")
@@ -44,7 +46,13 @@ _OF_MESHES: Final = ("resolution", "up")
 
 @click.command("render", cls=options.Sectioned, sections=_SECTIONS)
 @click.argument("files", nargs=-1, required=True, metavar="FILE…")
-@options.writes("OUT", "Picture, animation, numbered pictures or folder to write.")
+@options.writes(
+    "OUT", "Picture, animation, numbered pictures or folder to write; - is standard output.", ".png"
+)
+@options.text(
+    "--format", "SUFFIX", "Format of what goes to standard output, a suffix such as png, jpg, gif, svg or "
+    "stl; by default png.", is_eager=True, callback=lambda _, __, value: value and value.lower().lstrip("."),
+)  # fmt: skip
 @options.request()
 @options.film()
 @options.drawing()
@@ -71,6 +79,7 @@ def command(
     ctx: click.Context,
     files: tuple[str, ...],
     out: str,
+    format: str | None,
     request: options.Request,
     film: options.FilmOptions,
     how: How,
@@ -147,6 +156,8 @@ def command(
         raise click.UsageError("A compiled program is a single frame; --frames and --fps take a scene.")
     if film.cluster is not None:
         raise click.UsageError("--cluster draws the frames of an animation; sweep draws many pictures.")
+    if outputs and shown(out) != out and not out.endswith(".exr"):
+        raise click.UsageError(f"--output writes files beside the picture; {shown(out)} takes them as exr.")
     paths = targets(files, out)
     check_outputs(paths, outputs)
     refused = None
@@ -180,7 +191,7 @@ def command(
 
                     ms = work_ms(job.program, job.how.care["samples"])
                     job.notes.append(f"about {ms:,.0f} ms of work for the network were foretold")
-                click.echo("\n  ".join([f"{job.name} -> {path}", *job.notes]), err=True)
+                click.echo("\n  ".join([f"{job.name} -> {shown(path)}", *job.notes]), err=True)
     for line in told:
         click.echo(line, err=True)
     if verbose and able:
@@ -210,9 +221,9 @@ def _shape(
     for param in ctx.command.params:
         given = ctx.get_parameter_source(param.name or "") == ParameterSource.COMMANDLINE
         if given and param.name not in known:
-            raise click.UsageError(f"{param.opts[0]} is of pictures, and `{out}` holds no pixels.")
+            raise click.UsageError(f"{param.opts[0]} is of pictures, and `{shown(out)}` holds no pixels.")
     if len(files) > 1:
-        raise click.UsageError(f"`{out}` is one file, and holds one scene.")
+        raise click.UsageError(f"`{shown(out)}` is one file, and holds one scene.")
     if how.backend == "reference":
         raise click.UsageError("--backend reference draws pictures; shapes are those of the model's field.")
     path = Path(out)
@@ -246,7 +257,7 @@ def _shape(
         raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
     if verbose:
         lines = "".join(f"\n  {note}" for note in (*job.notes, f"{len(data):,} bytes"))
-        click.echo(f"{job.name} -> {path}{lines}\n{clock.report()}", err=True)
+        click.echo(f"{job.name} -> {shown(path)}{lines}\n{clock.report()}", err=True)
 
 
 def _moves(job: Input, target: Target, film: FilmOptions, out: str) -> bool:
@@ -263,7 +274,7 @@ def _moves(job: Input, target: Target, film: FilmOptions, out: str) -> bool:
         return "%" in out
     if target.path.suffix.lower() in PICTURES:
         return True
-    fact = f"`{out}` is for animations, and the scene has no animate(…)"
+    fact = f"`{shown(out)}` is for animations, and the scene has no animate(…)"
     raise click.UsageError(f"{fact}; {listing(sorted(PICTURES))} hold a picture too.")
 
 
@@ -292,7 +303,7 @@ def _animate(
     if strict and diagnostics.items:
         raise SceneError(diagnostics)
     if outputs and target.kind != "sequence":
-        what = f"`{out}` is one file; numbered pictures such as frame-%04d.png have outputs"
+        what = f"`{shown(out)}` is one file; numbered pictures such as frame-%04d.png have outputs"
         raise click.UsageError(f"{what}.")
     check_outputs([target.file(number) for number in numbers], outputs)
     try:
@@ -303,7 +314,7 @@ def _animate(
                 progress=lambda now: bar(now.told, now.done, now.total),
             )  # fmt: skip
     except KeyboardInterrupt:
-        if target.work.exists():
+        if target.work.exists() and shown(out) == out:
             note = f"\nframes are kept in `{target.work}`; the same command goes on with the rest"
             click.echo(note, err=True)
         raise
@@ -311,7 +322,7 @@ def _animate(
         raise Trouble(f"cannot write `{out}`: {describe(error)}") from None
     say_diagnostics(diagnostics)
     first, last = result.files[0], result.files[-1]
-    name = f"{first} … {last.name}" if len(result.files) > 1 else str(first)
+    name = f"{first} … {last.name}" if len(result.files) > 1 else shown(first)
     parts = [plural(result.frames, "frame"), decimal(sum(file.stat().st_size for file in result.files))]
     if result.resumed:
         parts.append(f"{result.resumed} kept from a run before")
@@ -352,16 +363,18 @@ def _save(
             )
     else:
         image = _draw(job, clock, progress)
-    told = [] if (why := _blank(job, image)) is None else [f"{path}: {why}"]
+    told = [] if (why := _blank(job, image)) is None else [f"{shown(path)}: {why}"]
     if proof is not None:
-        told.append(f"{path}: {proof.told()}")
+        told.append(f"{shown(path)}: {proof.told()}")
         result = replace(result, proof=proof) if "proof" in outputs else result
     with clock("save"):
         try:
             saved = save_outputs(image, result, path)
         except ValueError as error:
-            raise Trouble(f"cannot write `{path}`: {error}") from None
-    return told + [f"{file}: {result.told(name)}" for file, name in zip(saved, result.names, strict=True)]
+            raise Trouble(f"cannot write `{shown(path)}`: {error}") from None
+    return told + [
+        f"{shown(file)}: {result.told(name)}" for file, name in zip(saved, result.names, strict=True)
+    ]
 
 
 def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
