@@ -1,8 +1,8 @@
 """Convolutions of 5 x 5 by fewer multiplications, which halve a step's time on a processor.
 
-Source: Lavin, Gray, *Fast Algorithms for Convolutional Neural Networks*, CVPR 2016. A tile of 4 x 4 results is
-had from 8 x 8 inputs by polynomial products (Toom, Cook): both factors are evaluated at seven points and at
-infinity along each axis, and multiplied there.
+Source: Lavin, Gray, *Fast Algorithms for Convolutional Neural Networks*, CVPR 2016. A tile of 4 x 4 results
+is had from 8 x 8 inputs by polynomial products (Toom, Cook): both factors are evaluated at seven points and
+at infinity along each axis, and multiplied there.
 
 Letters: M pictures, R pixels along a side, n = R / 4 tiles, C channels in and K out.
 """
@@ -30,8 +30,8 @@ def _transforms() -> tuple[Tensor, Tensor, Tensor]:
     inputs = np.linalg.inv(values(8)).T
     size = np.abs(inputs).max(1, keepdims=True)  # the same magnitude everywhere, for single precision
     parts = inputs / size, values(5) * size, values(4).T
-    inputs, kernel, results = (torch.from_numpy(np.kron(m, m)).float() for m in parts)
-    return inputs, kernel, results
+    whole = [torch.from_numpy(np.kron(m, m)).float() for m in parts]
+    return whole[0], whole[1], whole[2]
 
 
 INPUTS, KERNEL, RESULTS = _transforms()
@@ -59,7 +59,7 @@ class _Convolve(torch.autograd.Function):
         return result
 
     @staticmethod
-    def backward(ctx: Any, g: Tensor) -> tuple[Tensor, Tensor]:  # type: ignore[override]
+    def backward(ctx: Any, g: Tensor) -> tuple[Tensor, Tensor]:
         seen, factor = ctx.saved_tensors
         (m, n), (_, c, k) = g.shape[1:3], factor.shape
         back, of_factor = factor.transpose(1, 2).contiguous(), torch.zeros_like(factor)
@@ -90,6 +90,7 @@ class Winograd(nn.Conv2d):
 
     def forward(self, x: Tensor) -> Tensor:
         m, _, r, _ = x.shape
+        assert self.bias is not None
         tiles: Tensor = _Convolve.apply(x.permute(0, 2, 3, 1), self.weight)  # type: ignore[no-untyped-call]
         whole = tiles.view(4, 4, m, r // 4, r // 4, -1).permute(2, 3, 0, 4, 1, 5).reshape(m, r, r, -1)
         return (whole + self.bias).permute(0, 3, 1, 2)

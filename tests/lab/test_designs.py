@@ -83,7 +83,8 @@ def test_fewer_multiplications_convolve_as_many_do() -> None:
     found, expected = Winograd(plain)(x), plain(x)
     g = torch.randn_like(expected)
     asked = (x, plain.weight, plain.bias)
-    for a, b in ((found, expected), *zip(*(torch.autograd.grad(y, asked, g) for y in (found, expected)))):
+    slopes = [torch.autograd.grad(y, asked, g) for y in (found, expected)]
+    for a, b in ((found, expected), *zip(*slopes, strict=True)):
         torch.testing.assert_close(a, b, atol=1e-4 * float(b.detach().std()), rtol=1e-4)
 
 
