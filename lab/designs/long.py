@@ -32,6 +32,7 @@ from lab.designs.students import (
     Student,
     StudentConfig,
     carry_frames,
+    carry_leaves,
     make_student,
 )
 from lab.designs.windows import draw, grid, maps, prefixes, windows
@@ -42,7 +43,7 @@ from scenelang.assets.files import read_regular
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.weights import MOST_BYTES, codes_of, open_weights
 from scenelang.drawing.neural.load import RENDERER, Model, load_network
-from scenelang.drawing.neural.paper import Level
+from scenelang.drawing.neural.paper import Level, Reading, Streaming
 
 WARM_UP = 100  # steps at the start of a phase
 UNSEEN, SEEN_AT_ONCE = 128, 16  # scenes of the curve
@@ -284,19 +285,22 @@ class LongTraining:
 
 def _make(config: LongConfig) -> Student:
     student = make_student(config.student, grown=True)
-    if isinstance(student, StreamingStudent):
-        network = student.renderer
+    network, exact = student.renderer, isinstance(student.lifting, ExactCodes)
+    if isinstance(student.lifting, ExactCodes):
+        with torch.no_grad():
+            student.lifting.codes.copy_(torch.eye(4))
+    if isinstance(network, Streaming):
         sides = {str(phase.side) for phase in config.phases} | {str(network.config.resolution)}
         for name in set(network.stages) - sides:
             del network.stages[name]
         for level in network.stages.values():
             assert isinstance(level, Level)
             level.cell.gates = Winograd(level.cell.gates)
-        if isinstance(student.lifting, ExactCodes):
-            with torch.no_grad():
-                student.lifting.codes.copy_(torch.eye(4))
+        if exact:
             carry_frames(network)
         network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    elif isinstance(network, Reading) and exact and network.config.leaves:
+        carry_leaves(network)
     return student
 
 

@@ -10,8 +10,8 @@ import pytest
 import torch
 
 import scenelang as nsg
-from lab.designs.long import LongConfig, LongPhase, LongTraining, export_long, trained_model
-from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, pictures, random_scenes
+from lab.designs.long import LongConfig, LongPhase, LongTraining, _make, export_long, trained_model
+from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, frames, pictures, random_scenes
 from lab.designs.students import LiftingConfig, StreamingStudent, StudentConfig, make_student
 from lab.designs.windows import draw, grid, maps, prefixes, windows
 from lab.designs.winograd import Winograd
@@ -86,6 +86,15 @@ def test_fewer_multiplications_convolve_as_many_do() -> None:
     slopes = [torch.autograd.grad(y, asked, g) for y in (found, expected)]
     for a, b in ((found, expected), *zip(*slopes, strict=True)):
         torch.testing.assert_close(a, b, atol=1e-4 * float(b.detach().std()), rtol=1e-4)
+
+
+def test_reading_may_begin_with_leaf_coordinates() -> None:
+    """`Reading.frames` holds the inverse frames of exact vectors at the start."""
+    student = StudentConfig("reading", "exact", reading=ReadingConfig(hidden=8, reads=2, leaves=1))
+    network, scenes = _make(LongConfig(student, ())), some(3)
+    with torch.no_grad():
+        found = network.renderer.frames(network.lifting.lift(scenes)).view(3, 4, 2, 3)
+    torch.testing.assert_close(found, frames(scenes))
 
 
 def test_it_goes_on_where_it_was(tmp_path: Path) -> None:
