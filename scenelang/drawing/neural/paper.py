@@ -96,8 +96,8 @@ class Reading(nn.Module):
             if rows is None:
                 return found
             own = torch.einsum("bkij,bpj->bpki", rows[:, i, ..., :2], points) + rows[:, i, None, ..., 2]
-            found = found + self.look_leaf(fourier_features(own, LEAF_OCTAVES).flatten(2))
-            return found
+            leaf: Tensor = self.look_leaf(fourier_features(own, LEAF_OCTAVES).flatten(2))
+            return found + leaf
 
         unused = None
         if count is not None:
