@@ -32,15 +32,18 @@ from lab.designs.students import (
     Student,
     StudentConfig,
     carry_frames,
+    carry_leaves,
     make_student,
 )
 from lab.designs.windows import draw, grid, maps, prefixes, windows
+from lab.designs.winograd import Winograd
 from lab.training.checkpoint import check_config, load_tensors, pack_training, save_tensors, unpack_training
 from lab.training.config import config_data
 from scenelang.assets.files import read_regular
 from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.weights import MOST_BYTES, codes_of, open_weights
 from scenelang.drawing.neural.load import RENDERER, Model, load_network
+from scenelang.drawing.neural.paper import Level, Reading, Streaming
 
 WARM_UP = 100  # steps at the start of a phase
 UNSEEN, SEEN_AT_ONCE = 128, 16  # scenes of the curve
@@ -71,7 +74,6 @@ class LongConfig:
     seed: int = 1  # of parameters and scenes
     data: PictureConfig = field(default_factory=PictureConfig)  # distribution of the scenes
     average: float = 0.998  # decay of the averaged weights, which are what is evaluated and kept
-    halves: bool = True  # convolutions of 16 x 16 and more in bfloat16
     every: int = 500  # steps between points of the curve
 
     def to_json(self) -> dict[str, Any]:
@@ -203,18 +205,16 @@ class LongTraining:
             return self._lifting_loss(scenes)
         if isinstance(self.student, ReadingStudent):
             x, y = torch.rand((2, phase.scenes, phase.side), generator=self.generator) * 2 - 1
-            with torch.autocast("cpu", torch.bfloat16, enabled=self.config.halves):
-                result = self.student.points(scenes, x, y).float()
-            gap = result - shown(scenes, x, y)
+            gap = self.student.points(scenes, x, y) - shown(scenes, x, y)
             loss: Tensor = gap.square().mean() + 0.1 * gap.abs().mean()
             return loss
         assert isinstance(self.student, StreamingStudent)
-        side, window, halves = phase.side, phase.window, self.config.halves
+        side, window = phase.side, phase.window
         corner = windows(scenes, side, window, self.generator) if window else None
         x, y = grid(phase.scenes, side, corner, window)
-        seen = maps(self.student, scenes, side, corner, window, halves=halves)
+        seen = maps(self.student, scenes, side, corner, window)
         exact = prefixes(scenes, x, y, window or side)
-        result = draw(self.student, scenes, side, seen, halves=halves)
+        result = draw(self.student, scenes, side, seen)
         error = (result - exact).square().flatten(2).mean(2)  # (B, N)
         return (error + FLOOR).log().mean() if phase.variance == "own" else 20 * error.mean()
 
@@ -285,16 +285,22 @@ class LongTraining:
 
 def _make(config: LongConfig) -> Student:
     student = make_student(config.student, grown=True)
-    if isinstance(student, StreamingStudent):
-        network = student.renderer
+    network, exact = student.renderer, isinstance(student.lifting, ExactCodes)
+    if isinstance(student.lifting, ExactCodes):
+        with torch.no_grad():
+            student.lifting.codes.copy_(torch.eye(4))
+    if isinstance(network, Streaming):
         sides = {str(phase.side) for phase in config.phases} | {str(network.config.resolution)}
         for name in set(network.stages) - sides:
             del network.stages[name]
-        if isinstance(student.lifting, ExactCodes):
-            with torch.no_grad():
-                student.lifting.codes.copy_(torch.eye(4))
+        for level in network.stages.values():
+            assert isinstance(level, Level)
+            level.cell.gates = Winograd(level.cell.gates)
+        if exact:
             carry_frames(network)
         network.to(memory_format=torch.channels_last)  # type: ignore[call-overload]
+    elif isinstance(network, Reading) and exact and network.config.leaves:
+        carry_leaves(network)
     return student
 
 

@@ -202,6 +202,13 @@ CARRIED = 18  # channels: 4 of coordinates, 4 slopes, 2 warps, 4 of the code, 3 
 
 
 @torch.no_grad()
+def carry_leaves(network: Reading) -> None:
+    """Let the first coordinates of a pixel in an object be those in its leaf, before it is warped."""
+    network.frames.weight[:6] = torch.eye(WIDTH)[AT.frame]
+    network.frames.bias[:6] = 0.0
+
+
+@torch.no_grad()
 def carry_frames(network: Streaming) -> None:
     """Let deconvolutions carry frames, warps, codes and colours in their first `CARRIED` channels."""
     for level, layer in enumerate(network.deconvolutions):

@@ -56,13 +56,7 @@ def prefixes(scenes: SceneBatch, x: Tensor, y: Tensor, w: int) -> Tensor:
 
 
 def maps(
-    student: StreamingStudent,
-    scenes: SceneBatch,
-    side: int,
-    corner: Tensor | None,
-    window: int,
-    *,
-    halves: bool,
+    student: StreamingStudent, scenes: SceneBatch, side: int, corner: Tensor | None, window: int
 ) -> Tensor:
     """Feature maps (B, N, F, W, W) of the objects, in windows or whole."""
     vectors = student.lifting.lift(scenes)
@@ -72,23 +66,21 @@ def maps(
     for k, layer in enumerate(student.renderer.deconvolutions[:steps]):
         if corners is not None and k == steps - 2:  # what two layers make a window of
             x = cut(x, corners // 4 - 1, window // 4 + 2)
-        with torch.autocast("cpu", torch.bfloat16, enabled=halves and k >= 3):
-            x = torch.relu(layer(x))
+        x = torch.relu(layer(x))
         if corners is not None and k == steps - 2:
             x = x[..., 1:-1, 1:-1]
-            x = x * inside(corners // 2 - 1, x.shape[-1], side // 2)[:, None].to(x.dtype)
+            x = x * inside(corners // 2 - 1, x.shape[-1], side // 2)[:, None]
     if corners is not None:
         x = x[..., 2:-2, 2:-2]
     return x.reshape(*vectors.shape[:2], *x.shape[1:])
 
 
-def draw(student: StreamingStudent, scenes: SceneBatch, side: int, found: Tensor, *, halves: bool) -> Tensor:
+def draw(student: StreamingStudent, scenes: SceneBatch, side: int, found: Tensor) -> Tensor:
     """Pictures of all prefixes (B, N, 3, W, W) by the student, from the result of `maps`."""
     level: Any = student.renderer.stages[str(side)]
     marks = one_hot(scenes.tokens, len(TOKENS)).float()
-    with torch.autocast("cpu", torch.bfloat16, enabled=halves):
-        stacked = torch.stack(level.states(found, marks), 1).flatten(0, 1)
-        image: Tensor = level.pixels(stacked.contiguous(memory_format=torch.channels_last)).float()
+    stacked = torch.stack(level.states(found, marks), 1).flatten(0, 1)
+    image: Tensor = level.pixels(stacked.contiguous(memory_format=torch.channels_last))
     return image.view(*found.shape[:2], *image.shape[1:])
 
 

@@ -34,9 +34,16 @@ def gru(x: np.ndarray, h: np.ndarray, wi: np.ndarray, wh: np.ndarray, *biases: n
     return (1 - keep) * np.tanh(a[2 * n :] + reset * b[2 * n :]) + keep * h
 
 
-def test_it_reads_as_the_paper_says() -> None:
+def features(point: np.ndarray) -> np.ndarray:
+    angles = np.outer(point, [np.pi, 2 * np.pi]).ravel()
+    return np.array([*point, *np.sin(angles), *np.cos(angles)])
+
+
+@pytest.mark.parametrize("leaves", [0, 1])
+def test_it_reads_as_the_paper_says(leaves: int) -> None:
+    """With ``leaves`` a pixel has coordinates in each object, too, by a linear map of its vector."""
     torch.manual_seed(5)
-    network = Reading(ReadingConfig(vector=6, hidden=5, reads=3, octaves=2)).double()
+    network = Reading(ReadingConfig(vector=6, hidden=5, reads=3, octaves=2, leaves=leaves)).double()
     with torch.no_grad():
         network.start.normal_()
     vectors, tokens = torch.randn(2, 3, 6).double(), torch.randint(0, 4, (2, 3))
@@ -44,18 +51,20 @@ def test_it_reads_as_the_paper_says() -> None:
     with torch.no_grad():
         found = network(vectors, tokens, points, count).numpy()
     w = {k: v.detach().numpy() for k, v in network.state_dict().items()}
-    look = np.concatenate([w["look_place.weight"], w["look_object.weight"]], 1), w["look_state.weight"]
+    names = ["look_place.weight", "look_object.weight", *["look_leaf.weight"] * leaves]
+    look = np.concatenate([w[name] for name in names], 1), w["look_state.weight"]
     look += w["look_place.bias"], w["look_state.bias"]
     after = tuple(w[f"next.{name}"] for name in ("weight_ih", "weight_hh", "bias_ih", "bias_hh"))
     for b, p in np.ndindex(2, 4):
-        x, y = points[b, p].tolist()
-        angles = [np.pi * x, 2 * np.pi * x, np.pi * y, 2 * np.pi * y]
-        place = np.array([x, y, *np.sin(angles), *np.cos(angles)])
+        place = features(points[b, p].numpy())
         state = w["start"]
         for _ in range(3):
             answers = []
             for i in range(int(count[b])):
                 seen = np.concatenate([vectors[b, i].numpy(), np.eye(4)[int(tokens[b, i])], [i / 4]])
+                if leaves:
+                    rows = (w["frames.weight"] @ vectors[b, i].numpy() + w["frames.bias"]).reshape(2, 3)
+                    seen = np.append(seen, features(rows @ [*points[b, p].tolist(), 1]))
                 answers.append(gru(np.concatenate([place, seen]), state, *look))
             state = gru(np.max(answers, 0), state, *after)
         np.testing.assert_allclose(found[b, p], w["head.weight"] @ state + w["head.bias"], atol=1e-12)

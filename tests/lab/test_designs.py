@@ -10,10 +10,11 @@ import pytest
 import torch
 
 import scenelang as nsg
-from lab.designs.long import LongConfig, LongPhase, LongTraining, export_long, trained_model
-from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, pictures, random_scenes
+from lab.designs.long import LongConfig, LongPhase, LongTraining, _make, export_long, trained_model
+from lab.designs.pictures import PictureConfig, SceneBatch, exact_vectors, frames, pictures, random_scenes
 from lab.designs.students import LiftingConfig, StreamingStudent, StudentConfig, make_student
 from lab.designs.windows import draw, grid, maps, prefixes, windows
+from lab.designs.winograd import Winograd
 from lab.sets.scenes import draw_scene
 from lab.training.scenes import GEOMETRIES
 from scenelang.compiler.compile import compile_scene
@@ -39,7 +40,7 @@ def config(lifting: str = "exact", *phases: LongPhase, renderer: str = "streamin
         reading=ReadingConfig(hidden=8, reads=2),
     )
     usual = (LongPhase(3, 2, 1e-3, side=4), LongPhase(9, 2, 1e-3, side=8, window=4, last=0.1))
-    return LongConfig(student, phases or usual, every=4, halves=False)
+    return LongConfig(student, phases or usual, every=4)
 
 
 def test_windows_are_parts_of_whole_pictures() -> None:
@@ -53,7 +54,7 @@ def test_windows_are_parts_of_whole_pictures() -> None:
     assert not (corner % 4).any()
     corner[:2] = torch.tensor([[0, 0], [24, 24]])
     with torch.no_grad():
-        found = [maps(student, scenes, 32, c, w, halves=False) for c, w in ((None, 0), (corner, 8))]
+        found = [maps(student, scenes, 32, c, w) for c, w in ((None, 0), (corner, 8))]
     exact, part = prefixes(scenes, *grid(9, 32), 32), prefixes(scenes, *grid(9, 32, corner, 8), 8)
     for b, (row, column) in enumerate(corner.tolist()):
         at = (..., slice(row, row + 8), slice(column, column + 8))
@@ -69,10 +70,31 @@ def test_a_picture_is_the_renderers() -> None:
     )
     scenes = some(4)
     with torch.no_grad():
-        found = draw(student, scenes, 8, maps(student, scenes, 8, None, 0, halves=False), halves=False)
+        found = draw(student, scenes, 8, maps(student, scenes, 8, None, 0))
         for count in range(1, 5):
             scenes.count = torch.full((4,), count)
             torch.testing.assert_close(found[:, count - 1], student.image(scenes, 8), atol=1e-5, rtol=1e-4)
+
+
+def test_fewer_multiplications_convolve_as_many_do() -> None:
+    torch.manual_seed(6)
+    plain = torch.nn.Conv2d(3, 8, 5, 1, 2)
+    x = torch.randn(130, 3, 8, 8, requires_grad=True)  # of more tiles than are transformed at a time
+    found, expected = Winograd(plain)(x), plain(x)
+    g = torch.randn_like(expected)
+    asked = (x, plain.weight, plain.bias)
+    slopes = [torch.autograd.grad(y, asked, g) for y in (found, expected)]
+    for a, b in ((found, expected), *zip(*slopes, strict=True)):
+        torch.testing.assert_close(a, b, atol=1e-4 * float(b.detach().std()), rtol=1e-4)
+
+
+def test_reading_may_begin_with_leaf_coordinates() -> None:
+    """`Reading.frames` holds the inverse frames of exact vectors at the start."""
+    student = StudentConfig("reading", "exact", reading=ReadingConfig(hidden=8, reads=2, leaves=1))
+    network, scenes = _make(LongConfig(student, ())), some(3)
+    with torch.no_grad():
+        found = network.renderer.frames(network.lifting.lift(scenes)).view(3, 4, 2, 3)
+    torch.testing.assert_close(found, frames(scenes))
 
 
 def test_it_goes_on_where_it_was(tmp_path: Path) -> None:

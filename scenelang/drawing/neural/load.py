@@ -145,7 +145,7 @@ def _streaming(config: dict[str, Any], manifest: Manifest, size: int) -> Streami
 
 def _reading(config: dict[str, Any], manifest: Manifest, size: int) -> Reading:
     sizes = {**config["student"]["reading"], "vector": WIDTH}
-    if any(type(v) is not int or not 1 <= v <= MOST_WIDTH for v in sizes.values()):
+    if any(type(v) is not int or not (k != "leaves") <= v <= MOST_WIDTH for k, v in sizes.items()):
         raise ModelError("a network size is out of range")
     known = ReadingConfig(**sizes)
     if 4 * 9 * known.hidden**2 > size or known.reads > 64 or known.octaves > 16:

@@ -46,6 +46,11 @@ class ReadingConfig:
     hidden: int = 128  # entries H of both states
     reads: int = 8  # how often a pixel reads the scene
     octaves: int = 6  # frequencies L of the Fourier features, π to 2^(L - 1) π per world unit
+    leaves: int = 0  # affine maps of an object by which a pixel has coordinates in it, besides the paper's
+
+
+LEAF_OCTAVES = 2
+LEAF = 2 + 4 * LEAF_OCTAVES  # features of a pair of leaf coordinates
 
 
 def fourier_features(points: Tensor, octaves: int) -> Tensor:
@@ -67,6 +72,9 @@ class Reading(nn.Module):
         # pixel's part once, an object's part once, instead of both for every pair.
         self.look_place = nn.Linear(place, 3 * config.hidden)
         self.look_object = nn.Linear(config.vector + len(TOKENS) + 1, 3 * config.hidden, bias=False)
+        if config.leaves:
+            self.frames = nn.Linear(config.vector, 6 * config.leaves)
+            self.look_leaf = nn.Linear(LEAF * config.leaves, 3 * config.hidden, bias=False)
         self.look_state = nn.Linear(config.hidden, 3 * config.hidden)
         self.next = nn.GRUCell(config.hidden, config.hidden)
         self.head = nn.Linear(config.hidden, 3)
@@ -81,22 +89,32 @@ class Reading(nn.Module):
         objects = torch.cat([vectors, marks, order.expand(b, n)[..., None]], -1)  # (B, N, D + 5)
         seen = self.look_object(objects)  # (B, N, 3 H)
         where = self.look_place(fourier_features(points, self.config.octaves))  # (B, P, 3 H)
+        rows = self.frames(vectors).view(b, n, -1, 2, 3) if self.config.leaves else None
+
+        def pair(i: int) -> Tensor:
+            found: Tensor = where + seen[:, i, None]  # (B, P, 3 H)
+            if rows is None:
+                return found
+            own = torch.einsum("bkij,bpj->bpki", rows[:, i, ..., :2], points) + rows[:, i, None, ..., 2]
+            leaf: Tensor = self.look_leaf(fourier_features(own, LEAF_OCTAVES).flatten(2))
+            return found + leaf
+
         unused = None
         if count is not None:
             unused = torch.arange(n, device=vectors.device) >= count[:, None]  # (B, N)
         state = self.start.expand(b, points.shape[1], -1)  # (B, P, H)
         for _ in range(self.config.reads):
-            state = self._read(state, where, seen, unused)
+            state = self._read(state, pair, n, unused)
         colour: Tensor = self.head(state)
         return colour
 
-    def _read(self, state: Tensor, where: Tensor, seen: Tensor, unused: Tensor | None) -> Tensor:
+    def _read(self, state: Tensor, pair: Callable[[int], Tensor], n: int, unused: Tensor | None) -> Tensor:
         """One read: every object from the state, the maximum over objects, the next state."""
         from_state = self.look_state(state)  # (B, P, 3 H)
         pooled = torch.full_like(state, -math.inf)
         rs, zs, ns = from_state.chunk(3, -1)
-        for i in range(seen.shape[1]):
-            ri, zi, ni = (where + seen[:, i, None]).chunk(3, -1)
+        for i in range(n):
+            ri, zi, ni = pair(i).chunk(3, -1)
             reset, keep = (ri + rs).sigmoid(), (zi + zs).sigmoid()
             answer = torch.lerp((ni + reset * ns).tanh(), state, keep)  # (B, P, H)
             if unused is not None:
