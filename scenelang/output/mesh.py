@@ -291,7 +291,9 @@ def surface_of(program: Program, resolution: int, exact: bool) -> tuple[Triangle
         said["W0553"] = f"more than {MOST_CELLS:,} cells: a resolution of {grid.resolution}, not {resolution}"
     if thin:
         said["W0552"] = f"parts about as thin as a cell of {side:.2g} may be missing or have holes"
-    return _parted(sampler, TriangleMesh(places, triangles, encoded(met.register[:3].T)), side), said
+    assert met.register is not None
+    colours = encoded(met.register[:3].T.astype(np.float64))
+    return _parted(sampler, TriangleMesh(places, triangles, colours), side), said
 
 
 def _crossings(grid: Grid, a: Index, b: Index) -> tuple[Floats, Floats]:

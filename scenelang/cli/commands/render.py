@@ -110,7 +110,7 @@ def command(
 
     OUT may hold shapes in place of pixels: curves of a flat scene (.svg), or the solids of a scene as one
     closed mesh with colours (.glb .ply .obj) or without (.stl), wherever the camera looks. Scenes are y up,
-    and so are meshes; with --up z slicers lay them as they stand.
+    and so are meshes; slicers lay them as they stand with --up z.
 
     With --output, PNG files have 16 bits and say what they hold in a text `scenelang`; an .exr holds the
     picture and all outputs as layers of floats.
