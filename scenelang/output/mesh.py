@@ -111,7 +111,8 @@ class Sampler:
     def touched(self, cells: Index, first: Floats, side: float) -> Index:
         """Those of some cells (M, 3), numbered from a point, that the surface may touch."""
         self.reach = 3**0.5 / 2 * side
-        return cells[abs(self.at(first + (cells + 0.5) * side)) <= self.steep * self.reach]
+        near: Index = cells[abs(self.at(first + (cells + 0.5) * side)) <= self.steep * self.reach]
+        return near
 
     def meet(self, p: Floats, gradient: bool = False, every: bool = False) -> Asked:
         """The field at points (M, 3), distances as far as `reach`, world units, beyond objects' balls."""
