@@ -267,7 +267,7 @@ def test_texts_of_drawings_are_set_in_a_font_that_is_given(tmp_path: Path) -> No
     learn("mine.ttf")
     assert "text left out: the font has no `\u6f22` (U+6F22)" in said[0]
     # two letters that advance by 700 of 1,000 and reach from 100, 0 to 700, 600; kerning is of A and B alone
-    assert "(23.5, -17)" in said[1]
+    assert "sign_centre is [23.5, -17]" in said[1]
     sign = load_element_file(zoo).elements[0]
     assert sign.about["font"] == hashlib.sha256(font.read_bytes()).hexdigest()
     assert float(sign.about["size"]) == pytest.approx(math.hypot(13, 6) / 2, rel=1e-3)

@@ -81,10 +81,10 @@ def test_what_is_missing_is_none_and_the_difference_plain(monkeypatch: pytest.Mo
     assert (figures["flip"], figures["ssim"]) == (None, None)
     assert figures["psnr"] > 40
     star = "star { material flat { color(#fa0); } }"
-    other = nsg.render(nsg.loads("star { scale(0.9); material flat { color(#0fa); } }"), size=(40, 40))
+    other = nsg.render(nsg.loads("star { scale(0.9); material flat { color(#0fa); } }"), size=(90, 40))
     monkeypatch.setattr(jobs, "_exact", lambda job, clip: other)
-    sheet = decoded(base64.b64decode(told(star, do="difference", size=[40, 40])["png"]))[28:]
-    network, exact, far = sheet[:, :40], sheet[:, 44:84], sheet[:, 88:]
+    sheet = decoded(base64.b64decode(told(star, do="difference", size=[90, 40])["png"]))[28:]
+    network, exact, far = sheet[:, :90], sheet[:, 94:184], sheet[:, 188:278]
     assert np.abs(network - exact).max() > 200
     assert np.abs(far - np.minimum(255, 8 * np.abs(network - exact))).max() <= 8
 
