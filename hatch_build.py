@@ -1,4 +1,4 @@
-"""What a wheel has beside its sources: the parse tables, which Lark makes of the grammar, and the kernel."""
+"""Files that a build makes: the parse tables, which Lark makes of the grammar, and the kernel's library."""
 
 from __future__ import annotations
 

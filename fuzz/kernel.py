@@ -72,7 +72,7 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
 
 
 def programs() -> list[Program]:
-    """Those of all scenes of solids."""
+    """Programs of all scenes of solids."""
     found = []
     for path in sorted([*ROOT.glob("examples/*.nsg"), *ROOT.glob("tests/conformance/cases/*.nsg")]):
         try:

@@ -278,7 +278,7 @@ def _room(graph: Graph, stage: Stage, at: Point, inside: Leaf | None) -> tuple[L
 
 
 def _thick(leaf: Leaf, space: Space) -> float:
-    """How thick a leaf is where it is thinnest, inf where that is not known."""
+    """The least thickness of a leaf, inf where that is not known."""
     row = GEOMETRIES.get(leaf.geometry)
     return space.stretches(steps.composed(leaf.steps))[0] * row.thickness if row is not None else inf
 
@@ -294,7 +294,7 @@ Within = tuple[float, float, Leaf]
 
 
 def _spans(fold: Fold, eye: Point, way: Point) -> list[Within]:
-    """Where a ray from the eye is within what is opaque of a fold, and whose."""
+    """Spans of a ray from the eye within what is opaque of a fold, and their leaves."""
     found = list[Within]()
     for link in fold.links:
         node = link.node

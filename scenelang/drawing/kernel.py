@@ -125,9 +125,7 @@ def _source() -> Any:
 def load_kernel() -> Kernel:
     """The kernel of this machine, loaded once; raises `KernelError` where there is none."""
     source = _source()
-    path = FOLDER / (
-        source.name() if source else "libkernel.dll" if sys.platform == "win32" else "libkernel.so"
-    )
+    path = FOLDER / ("libkernel.dll" if sys.platform == "win32" else "libkernel.so")
     if source is None:
         return Kernel(path)
     # looked for in the file, as a library that was loaded once is not loaded again from the same place

@@ -200,7 +200,7 @@ class Objects(NamedTuple):
     wide: Mask
 
     def flagged(self, flag: int) -> Mask:
-        """Which rows (N,) have a flag."""
+        """A mask (N,) of the rows that have a flag."""
         return np.asarray(self.rows["flags"] & flag > 0)
 
 

@@ -436,7 +436,7 @@ def drawn(data: bytes, face: Face | None = None) -> tuple[list[Layer], tuple[str
 
 
 def _unread(root: Any, data: bytes) -> list[str]:
-    """What a drawing has that is not read, with its lines; colours are rewritten as svgelements has them."""
+    """Notes of what is not read of a drawing, with lines; rewrites colours as svgelements has them."""
     lines, found = list[int](), dict[str, list[int]]()
     reader = expat.ParserCreate()
     reader.StartElementHandler = lambda *_: lines.append(reader.CurrentLineNumber)
@@ -487,8 +487,7 @@ def _commas(match: re.Match[str]) -> str:
 def _fitted(
     element: Any, outer: tuple[float, float], view: str, how: str, svg: Any
 ) -> tuple[str, tuple[float, float]]:
-    """Where the contents of an inner drawing lie, by its place, size and view, and the size that they see."""
-
+    """The transform of an inner drawing's contents, by its place, size and view, and the size they see."""
     usual = (("x", "0"), ("y", "0"), ("width", "100%"), ("height", "100%"))
     lengths = [svg.Length(element.get(key, text)) for key, text in usual]
     x, y, width, height = (float(one.value(96, outer[k % 2], 16)) for k, one in enumerate(lengths))

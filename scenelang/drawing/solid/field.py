@@ -636,7 +636,7 @@ class SolidField:
 
     @cached_property
     def tables(self) -> Tables:
-        """What the kernel takes."""
+        """Flat tables for the kernel."""
         return Tables(self.network, *self.rows, self.paints, self.reach)
 
     def near(self, p: Array, reach: Array, gradient: bool = False, every: bool = False) -> Asked:
