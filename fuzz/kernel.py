@@ -57,18 +57,32 @@ def mutated(program: Program, seed: int) -> Program:
     return replace(program, vectors=vectors, tokens=tokens, forms=forms, worn=worn)
 
 
+@np.errstate(all="ignore")
 def ask(kernel: Kernel, program: Program, seed: int) -> None:
-    """Ask the field of a Program anywhere; raises `ProgramError` where it holds no scene."""
+    """Ask for the field of a Program anywhere, for rays and for cones; raises `ProgramError` where it holds
+    no scene.
+    """
     rng = np.random.default_rng(seed)
     given = (program.vectors, program.tokens, program.brought(), program.paints())
-    tables = Tables(field_of(program, seed % 3 == 0), *given)  # type: ignore[arg-type]
+    tables = Tables(field_of(program, seed % 3 == 0), *given, reach=seed % 2 * 0.3)  # type: ignore[arg-type]
     p = (rng.normal(size=(3, POINTS)) * 10.0 ** rng.integers(-2, 3, POINTS)).astype(np.float32)
     some = rng.integers(0, POINTS, 3)
     p[rng.integers(0, 3, 3), some] = (np.inf, np.nan, 3e38)
     reach = np.array([0.0, 0.1, 3.0, np.inf], np.float32)[rng.integers(0, 4, POINTS)]
     found = kernel.field(tables, p, reach, *(rng.random(2) < 0.5).tolist())
     assert ((found.owner >= 0) & (found.owner <= len(program))).all()
-    kernel.own(tables, rng.integers(0, len(program), POINTS), p)
+    objects = rng.integers(0, len(program), POINTS)
+    kernel.own(tables, objects, p)
+    kernel.worn(tables, objects, p)
+    way = rng.normal(size=(3, POINTS))
+    way = (way / np.linalg.norm(way, axis=0)).astype(np.float32)
+    limit = np.array([0.0, 1.0, 30.0, np.inf, np.nan], np.float32)[rng.integers(0, 5, POINTS)]
+    gap, steps = float(rng.choice([0.0, 0.009, 1.0])), int(rng.choice([0, 3, 800]))
+    for origin in (p, p[:, int(rng.integers(POINTS))]):
+        trails = kernel.rays(tables, origin, way, limit, reach, gap=gap, steps=steps, parted=bool(seed % 2))
+        assert (np.diff(trails.pieces["ray"]) >= 0).all()
+    lamp, radius = rng.normal(size=3) * 10.0 ** rng.integers(-1, 2), float(rng.choice([0.0, 0.1, 3.0, 1e9]))
+    kernel.cones(tables, lamp.astype(np.float32), radius, p, way)
 
 
 def programs() -> list[Program]:

@@ -9,7 +9,12 @@
 #define EACH(v) \
     int64_t scratch_##v(const Scene *); \
     int64_t field_##v(const Scene *, int64_t, const float *, const float *, float *, float *, float *, int32_t *, void *); \
-    void own_##v(const Scene *, int64_t, const int32_t *, const float *, float *, float *);
+    void own_##v(const Scene *, int64_t, const int32_t *, const float *, float *, float *, float *); \
+    int64_t rays_##v(const Scene *, int64_t, int64_t, const float *, const float *, const float *, const float *, float, int32_t, \
+                     int32_t, int32_t, float *, float *, int32_t *, float *, int64_t *, Piece *, int64_t, void *); \
+    void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
+                   float *, int64_t *, void *); \
+    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -36,15 +41,30 @@ OUT int32_t newest(void) { return 0; }
 #endif
 OUT const char *mark(void) { return MARK; }  // a digest of the sources
 // What tables.py has to agree with.
-OUT void sizes(int32_t r[6]) {
-    size_t all[6] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Scene)};
-    for (int i = 0; i < 6; i++) r[i] = (int32_t)all[i];
+OUT void sizes(int32_t r[9]) {
+    size_t all[9] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
+                     sizeof(Lamp), sizeof(Stage)};
+    for (int i = 0; i < 9; i++) r[i] = (int32_t)all[i];
 }
 OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); }
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
                   float *gradient, float *look, int32_t *owner, void *memory) {
     return PICK(field, s, n, p, reach, distance, gradient, look, owner, memory);
 }
-OUT void own(int32_t variant, const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient) {
-    PICK(own, s, n, object, p, distance, gradient);
+OUT void own(int32_t variant, const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient,
+             float *colour) {
+    PICK(own, s, n, object, p, distance, gradient, colour);
+}
+OUT int64_t rays(int32_t variant, const Scene *s, int64_t n, int64_t origins, const float *p, const float *way, const float *begin,
+                 const float *limit, float gap, int32_t steps, int32_t halvings, int32_t coloured, float *hit, float *length,
+                 int32_t *soft, float *depth, int64_t *counts, Piece *piece, int64_t room, void *memory) {
+    return PICK(rays, s, n, origins, p, way, begin, limit, gap, steps, halvings, coloured, hit, length, soft, depth, counts, piece, room, memory);
+}
+OUT void cones(int32_t variant, const Scene *s, int64_t n, const float *at, float radius, const float *way, const float *far,
+               const float *spread, const float *normal, float *part, int64_t *counts, void *memory) {
+    PICK(cones, s, n, at, radius, way, far, spread, normal, part, counts, memory);
+}
+OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light,
+               float *alpha, int64_t *counts, void *memory) {
+    PICK(shade, s, stage, n, across, way, light, alpha, counts, memory);
 }

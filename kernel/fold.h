@@ -2,10 +2,17 @@
 #pragma once
 #include "texture.h"
 #define EMPTY 100.0f  // world units: the distance where nothing has been met
+#define JUMP 0.03f  // of media that differ: linear colours and extinction
 #define NOTHING 10.0f  // how far a group with nothing in it is at most for what it is taken in by
-enum { DISTANCE, GRADIENT = 1, REGISTER_ = 2, OWNER = 4, ALL = 7 };  // what is asked, known to the compiler
+enum { DISTANCE, GRADIENT = 1, REGISTER_ = 2, OWNER = 4, ALL = 7, KIND = 8 };  // what is asked, known to the compiler
 
-typedef struct { F d; V g; F look[REGISTER]; M owner; } State;
+typedef struct {
+    F d;
+    V g;
+    F look[REGISTER];
+    M owner;
+    F kind, change;  // 1 in a medium; a bound on how far another object's material may begin
+} State;
 typedef struct {
     State state[1 + DEEP];  // of all, then of the groups that are open
     M met[1 + DEEP], touched;  // points that met something: in each group, and at all
@@ -20,6 +27,14 @@ IN State nothing(const Scene *s, const int wanted) {
     r.g = (V){all(0), all(0), all(0)};
     r.owner = ints(0);
     if (wanted & REGISTER_) for (int k = 0; k < s->rows; k++) r.look[k] = all(0);
+    if (wanted & KIND) { r.kind = all(0); r.change = all(EMPTY); }
+    return r;
+}
+// How much media with such registers differ.
+IN F unlike(const Scene *s, const F *a, const F *b) {
+    F r = all(0);
+    if (s->coloured) for (int k = s->hues - 3; k < s->hues; k++) r += size_of(a[k] - b[k]);
+    if (s->dense) r += size_of(a[s->rows - s->switched] - b[s->rows - s->switched]);
     return r;
 }
 // Let a state take in an operand where `in` holds.
@@ -32,8 +47,10 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
         F own = take * c->candidate + rate * c->own[0], past = keep + rate * c->past[0];
         a->g = choose(in, plus(scaled(x->g, own), scaled(a->g, past)), a->g);
     }
-    if (wanted & (REGISTER_ | OWNER)) {
+    if (wanted & (REGISTER_ | OWNER | KIND)) {
         F kind = max2(c->own[3] * x->d + c->past[3] * a->d + c->bias[3], c->own[4] * x->d + c->past[4] * a->d + c->bias[4]);
+        M differ = wanted & KIND ? size_of(a->kind - x->kind) > 0.5f : ints(0);
+        if ((wanted & KIND) && (wanted & REGISTER_)) differ |= (a->kind + x->kind > 1.0f) & (unlike(s, a->look, x->look) > JUMP);
         if (wanted & REGISTER_) {
             F paint = max2(c->own[1] * x->d + c->past[1] * a->d + c->bias[1], c->own[2] * x->d + c->past[2] * a->d + c->bias[2]);
             F gates[2] = {sel(in, clamp(paint, 0, 1), all(0)), sel(in, clamp(kind, 0, 1), all(0))};
@@ -41,6 +58,13 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
                 a->look[k] += gates[k >= s->rows - s->switched] * (x->look[k] - a->look[k]);
         }
         M held = in & (kind > 0.5f);
+        if (wanted & KIND) {
+            F room = size_of(x->d);  // within which the operand leaves the kind of material, or the medium, as it is
+            if (c->smooth) room = min2(room, 0.5f * size_of(a->d - x->d));
+            room = min2(sel(differ, room, all(EMPTY)), x->change);
+            a->change = sel(in, min2(a->change, room), a->change);
+            a->kind += sel(in, clamp(kind, 0, 1), all(0)) * (x->kind - a->kind);
+        }
         if (wanted & OWNER) a->owner = (x->owner & held) | (a->owner & ~held);
     }
     a->d = sel(in, after, a->d);
@@ -80,11 +104,12 @@ IN void fold_take(const Scene *s, Fold *f, const Object *o, V p, M in, int far, 
     x.d = wanted & GRADIENT ? leaf_slope(s, o, p, far, &x.g, &local) : leaf_distance(s, o, p, far, &local);
     if (wanted & REGISTER_) {
         for (int k = 0; k < s->rows; k++) x.look[k] = all(o->look[k]);
-        if (o->texture >= 0) {
+        if (o->texture >= 0 && !(wanted & KIND)) {  // rays tell media apart by plain colours
             V c = coloured(s->texture + o->texture, local);
             x.look[0] = c.x; x.look[1] = c.y; x.look[2] = c.z;
         }
     }
+    if (wanted & KIND) { x.kind = all(o->look[s->rows - 1]); x.change = all(EMPTY); }
     if (wanted & OWNER) x.owner = ints(1 + (int)(o - s->object));
     join(s, s->cell + (o - s->object), f->state + f->level, &x, in, wanted);
     f->met[f->level] |= in;

@@ -8,7 +8,7 @@
 #define TINY 1e-12f
 
 IN F signed_as(F a, F size) { return sel(a < 0.0f, -size, sel(a > 0.0f, size, all(0))); }
-IN F apart(V p) { return root(dot(p, p)); }
+IN F length_of(V p) { return root(dot(p, p)); }
 // Distances to where levels, distances from orthogonal planes or lines, are all below zero; derivatives by these.
 IN F corner(const int count, const F *level, F *by) {
     F highest = level[0], sum = all(0), square = all(0);
@@ -32,7 +32,7 @@ static F formula(int which, V p, int grad, V *g) {
     V r;
     switch (which) {
         case SPHERE: {
-            F length = max2(apart(p), all(TINY));
+            F length = max2(length_of(p), all(TINY));
             d = length - 1.0f; r = scaled(p, 1.0f / length);
             break;
         }
@@ -64,7 +64,7 @@ static F formula(int which, V p, int grad, V *g) {
         case CAPSULE: {
             F beyond = signed_as(p.y, max2(size_of(p.y) - 0.5f, all(0)));
             V q = {p.x, beyond, p.z};
-            F length = max2(apart(q), all(TINY));
+            F length = max2(length_of(q), all(TINY));
             d = length - 0.5f; r = scaled(q, 1.0f / length);
             break;
         }
@@ -74,7 +74,7 @@ static F formula(int which, V p, int grad, V *g) {
             F way = max2(max2(most - 1.0f, 0.5f * (above - least)), above / 3.0f);
             M out = above > 0.0f;
             V q = {sel(out, min2(a, way), all(1)), sel(out, min2(b, way), all(1)), sel(out, min2(c, way), all(1))};
-            F length = max2(apart(q), all(TINY)), over = 1.0f / length;
+            F length = max2(length_of(q), all(TINY)), over = 1.0f / length;
             d = sel(out, length, above * HALF_CUBE);
             r = (V){signed_as(p.x, q.x * over), signed_as(p.y, q.y * over), signed_as(p.z, q.z * over)};
         }

@@ -1,5 +1,6 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
-#include "fold.h"
+#include "cone.h"
+#include "shade.h"
 #define BLOCK (256 / W)  // packets that have a list of objects in common
 #ifndef NAME
 #define NAME(x) x
@@ -9,7 +10,7 @@ typedef struct { V at; M in; const Object *object; int far; } Near;  // an objec
 
 static void *aligned(void *p) { return (void *)(((uintptr_t)p + 63) & ~(uintptr_t)63); }
 // Bytes of scratch that calls need.
-int64_t NAME(scratch)(const Scene *s) { return 128 + (int64_t)(sizeof(Near) + sizeof(int32_t)) * (s->objects + 1); }
+int64_t NAME(scratch)(const Scene *s) { return 128 + (int64_t)(sizeof(Slot) + sizeof(int32_t)) * (s->objects + 1); }
 
 IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
     for (int k = 0; k < W; k++) {
@@ -114,8 +115,10 @@ int64_t NAME(field)(const Scene *s, int64_t n, const float *p, const float *reac
                         : asked(s, n, p, reach, distance, 0, 0, 0, scratch, DISTANCE);
     return asked(s, n, p, reach, distance, gradient, look, owner, scratch, ALL);
 }
-// Distances of objects alone, whatever else there is, and their gradients (3, n), at points (3, n) with numbers from 0.
-void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient) {
+// Distances of objects alone, whatever else there is, and their gradients (3, n), at points (3, n) with numbers from 0;
+// or, unless null, their colours (3, n) instead.
+void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient, float *colour) {
+    float *to = colour ? colour : gradient;
     for (int64_t i = 0; i < n; i += W) {
         V q, g = {all(0), all(0), all(0)};
         F d = all(0);
@@ -125,10 +128,126 @@ void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p,
             const Object *o = s->object + object[i + k];
             M mine;
             for (int j = 0; j < W; j++) mine[j] = i + j < n && object[i + j] == object[i + k] ? -1 : 0;
-            V slope, local;
-            F own = leaf_slope(s, o, mapped(o->map, q), 1, &slope, &local);
-            d = sel(mine, own, d); g = choose(mine, slope, g);
+            V slope, local, own = mapped(o->map, q);
+            if (!colour) d = sel(mine, leaf_slope(s, o, own, 1, &slope, &local), d);
+            else if (o->texture < 0) slope = (V){all(o->look[0]), all(o->look[1]), all(o->look[2])};
+            else {
+                leaf_distance(s, o, own, 1, &local);
+                slope = coloured(s->texture + o->texture, local);
+            }
+            g = choose(mine, slope, g);
         }
-        store(distance, n, i, d); store(gradient, n, i, g.x); store(gradient + n, n, i, g.y); store(gradient + 2 * n, n, i, g.z);
+        if (!colour) store(distance, n, i, d);
+        store(to, n, i, g.x); store(to + n, n, i, g.y); store(to + 2 * n, n, i, g.z);
     }
+}
+IN int64_t followed(const Scene *s, int64_t n, int64_t origins, const float *p, const float *way, const float *begin,
+                    const float *limit, float gap, int32_t steps, int32_t halvings, float *hit, float *length, int32_t *soft,
+                    float *depth, int64_t counts[5], Piece *piece, int64_t room, void *scratch, const int wanted) {
+    Slot *slot = aligned(scratch);
+    int32_t *list = (int32_t *)(slot + s->objects + 1);
+    Pieces pieces = {piece, 0, room};
+    int64_t lost = 0, met = 0, near = 0, asked = 0;
+    int count = s->objects;
+    for (int i = 0; i < count; i++) list[i] = i;
+    for (int64_t i = 0; i < n; i += W) {
+        V from, to;
+        F low, high;
+        if (i % (BLOCK * W) == 0 && origins == 1) {
+            float axis[3], cosine = cone_of(way, n, i + BLOCK * W < n ? i + BLOCK * W : n, i, axis);
+            count = in_cone(s, p, axis, cosine, list);
+        }
+        read_points(way, n, i, &to);
+        if (origins == 1) from = (V){all(p[0]), all(p[1]), all(p[2])};
+        else read_points(p, n, i, &from);
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < n ? i + k : n - 1;
+            low[k] = begin[j]; high[k] = i + k < n ? limit[j] : -BIG;
+        }
+        int m = slots_of(s, from, to, low, min2(high, all(BIG)), list, count, slot);
+        Trail r = march(s, slot, m, gap, steps, halvings, (int32_t)i, &pieces, &met, wanted);
+        store(hit, n, i, r.hit); store(length, n, i, r.length); store((float *)soft, n, i, (F)r.soft);
+        store(depth, n, i, r.depth);
+        lost += __builtin_popcount(bits(r.lost));
+        near += __builtin_popcount(bits(drawing(slot, m)));
+        asked += r.asked;
+    }
+    counts[0] = pieces.count; counts[1] = lost; counts[2] = met; counts[3] = near; counts[4] = asked;
+    return pieces.count;
+}
+// Follow n rays along unit ways (3, n) from one origin (3,) or n (3, n), from `begin` (n) up to a limit (n), by so many
+// steps at most: how far the first opaque surface is, inf for none, how long the ways in media before it are, whether (-1
+// or 0) a medium gives way to it, and how deep, optically, these media are; pieces of these ways, as many as there is room
+// for, cut where media differ, in colour only if `coloured`. Counts are of all pieces, of rays that came to no end, of pairs
+// of points and objects, of rays that pass what draws, and of points.
+int64_t NAME(rays)(const Scene *s, int64_t n, int64_t origins, const float *p, const float *way, const float *begin,
+                   const float *limit, float gap, int32_t steps, int32_t halvings, int32_t coloured, float *hit, float *length,
+                   int32_t *soft, float *depth, int64_t counts[5], Piece *piece, int64_t room, void *scratch) {
+    Scene own = *s;
+    own.coloured = s->coloured && coloured;
+    s = &own;
+    if (s->mixed || s->dense || s->coloured)
+        return followed(s, n, origins, p, way, begin, limit, gap, steps, halvings, hit, length, soft, depth, counts, piece, room, scratch, KIND);
+    return followed(s, n, origins, p, way, begin, limit, gap, steps, halvings, hit, length, soft, depth, counts, piece, room, scratch, DISTANCE);
+}
+// Shares (n) of the light of a lamp of a radius at a point that points at `far` (n) along unit ways (3, n) from it receive
+// through what there is, which is opaque; surfaces there have normals (3, n), 0 for points in media. `spread` (n) is the
+// lamp's radius at distance 1 from the points. Counts are of rays that pass what draws and of pairs of points and objects.
+void NAME(cones)(const Scene *s, int64_t n, const float *at, float radius, const float *way, const float *far, const float *spread,
+                 const float *normal, float *part, int64_t counts[2], void *scratch) {
+    Slot *slot = aligned(scratch);
+    int32_t *list = (int32_t *)(slot + s->objects + 1);
+    V from = {all(at[0]), all(at[1]), all(at[2])};
+    int64_t met = 0, near = 0;
+    int count = 0;
+    for (int64_t i = 0; i < n; i += W) {
+        if (i % (BLOCK * W) == 0) {
+            float axis[3], cosine = cone_of(way, n, i + BLOCK * W < n ? i + BLOCK * W : n, i, axis);
+            count = in_cone(s, at, axis, cosine, list);
+        }
+        Cone c = {.at = from, .radius = radius};
+        read_points(way, n, i, &c.way);
+        read_points(normal, n, i, &c.normal);
+        M there = ints(0);
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < n ? i + k : n - 1;
+            c.far[k] = far[j]; c.spread[k] = spread[j]; there[k] = i + k < n ? -1 : 0;
+        }
+        F wide = (ASIDE + WIDE) * c.spread;
+        F limit = sel(there, min2(c.far - FLOOR, all(BIG)), all(-BIG));
+        int m = slots(s, from, c.way, all(radius), limit, s->reach - wide * c.far, wide, list, count, slot, 1);
+        M some = drawing(slot, m);
+        near += __builtin_popcount(bits(some));
+        store(part, n, i, any(some) ? sel(some, shown(s, slot, m, &c, &met), all(1)) : all(1));
+    }
+    counts[0] = near; counts[1] = met;
+}
+// Light (3, n) and alpha (n) along n rays of unit ways (3, n) from the eye of a stage, of opaque objects with plain colours;
+// rays lie in rows of `across`. Counts are of rays from lamps, of rays that pass what draws, of
+// points, of pairs of points and objects, and of rays that came to no end.
+void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light, float *alpha,
+                 int64_t counts[5], void *scratch) {
+    Slot *slot = aligned(scratch);
+    int32_t *list = (int32_t *)(slot + s->objects + 1);
+    Shaded w = {0, 0, 0, 0, 0};
+    Beam b;
+    int64_t at[BEAM], rows = across ? n / across : 0, side = 16;
+    if (rows < 16 || across < 16) { across = n; rows = 1; side = BEAM; }
+    for (int64_t top = 0; top < rows; top += 16) for (int64_t left = 0; left < across; left += side) {
+        int k = 0;
+        for (int64_t y = top; y < top + 16 && y < rows; y += 2)  // in pairs of rows, so that packets are compact
+            for (int64_t x = left; x < left + side && x < across; x++)
+                for (int64_t j = y; j < y + 2 && j < rows; j++) {
+                    for (int d = 0; d < 3; d++) b.way.v[d][k] = way[d * n + j * across + x];
+                    at[k++] = j * across + x;
+                }
+        int whole = k;
+        for (; k % W; k++) for (int d = 0; d < 3; d++) b.way.v[d][k] = b.way.v[d][whole - 1];
+        shade_block(s, stage, &b, whole, slot, list, &w);
+        for (int i = 0; i < whole; i++) {
+            for (int d = 0; d < 3; d++) light[d * n + at[i]] = b.light.v[d][i];
+            alpha[at[i]] = b.alpha[i];
+        }
+    }
+    counts[0] = w.lights; counts[1] = w.near; counts[2] = w.steps; counts[3] = w.met; counts[4] = w.lost;
 }

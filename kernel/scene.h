@@ -3,7 +3,7 @@
 #pragma once
 #include <stdint.h>
 enum { DEEP = 15, REGISTER = 12, CELL_ROWS = 5, FEATURES = 7, UNITS = 8, LINES = 27, WIDEST = 32, STEPS = 9 };
-enum { DRAWS = 1, CLIPS = 2, BEGINS = 4, BOXED = 8, SKINNED = 16, BUMPY = 32, STOPS = 64, MEDIUM = 128 };
+enum { DRAWS = 1, CLIPS = 2, BEGINS = 4, BOXED = 8, SKINNED = 16, BUMPY = 32, STOPS = 64, MEDIUM = 128, WIDER = 256 };
 enum { MAP, TURN_Z, TURN_Y };  // kinds of steps
 enum { NORMS, SILU, GRID, GROWN, FORMULA };  // kinds of decoders
 enum { SPHERE, TORUS, BOX, CYLINDER, CONE, CAPSULE, OCTAHEDRON };  // formulas
@@ -34,17 +34,28 @@ typedef struct {
 } Decoder;
 typedef struct {  // gates: that of distance, two of colour, two of the kind of material
     float own[CELL_ROWS], past[CELL_ROWS], bias[CELL_ROWS], candidate, bump;
+    int32_t smooth;
 } Cell;
 typedef struct {
     int32_t kind, wide, high, stops, steps;  // sides of texels, or of colours of space; numbers of stops and steps
     float place[6];  // from leaf coordinates x and y to the picture
     const float *data, *step;  // texels (3, high, wide), nodes (3, n, n, n) or stops (k, 4); steps (k, 4)
 } Texture;
+typedef struct { int32_t ray; float begin, end, before, sigma; } Piece;  // of a ray in media; optical depth before it over sigma
 typedef struct {
     int32_t objects, groups, deepest, rows, switched, clipping;  // rows of the register; the last that come with a kind
+    int32_t media, mixed;  // whether there are media, and opaque things too
+    int32_t hues, dense, coloured;  // rows of colours; whether media have different extinctions, and colours
+    float sigma, reach;  // the extinction of all media, where it is one; how far around objects distances hold
     const Object *object;
     const Step *step;
     const Decoder *decoder;
     const Cell *cell;  // of the objects, then of the groups
     const Texture *texture;
 } Scene;
+typedef struct { float at[3], power[3]; } Lamp;  // a point; power times colour
+typedef struct {
+    float eye[3], horizon[3], zenith[3], ground[3], floor, gap, ambient[2], fade, nearest, lift;
+    int32_t lamps, grounded, transparent, glow;  // `glow`: the first row of the register that tells it, 0 for none
+    const Lamp *lamp;
+} Stage;

@@ -9,6 +9,8 @@ from __future__ import annotations
 import ctypes
 import importlib.util
 import sys
+import warnings
+from collections.abc import Iterator
 from functools import cache
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -17,23 +19,40 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.drawing.arrays import Array
-from scenelang.drawing.how import RenderError
-from scenelang.drawing.tables import CELL, DECODER, OBJECT, SCENE, STEP, TEXTURE, Tables
+from scenelang.drawing.how import RenderError, check_time
+from scenelang.drawing.tables import (
+    CELL,
+    DECODER,
+    LAMP,
+    OBJECT,
+    PIECE,
+    SCENE,
+    STAGE,
+    STEP,
+    TEXTURE,
+    Rows,
+    Tables,
+)
 
 FOLDER: Final = Path(__file__).resolve().parent
 ROOT: Final = FOLDER.parents[1]  # of a checkout
-_SIZES: Final = [dtype.itemsize for dtype in (OBJECT, STEP, DECODER, CELL, TEXTURE, SCENE)]
+_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE)
+_SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
-    "newest": ("", "i"),
-    "sizes": ("p", ""),
-    "scratch": ("ip", "l"),
-    "field": ("iplppppppp", "l"),
-    "own": ("iplpppp", ""),
+    **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
+    **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
+    **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
 }
-"""Arguments and results of the library's functions: i int32, l int64, p an address."""
-_TYPES: Final = {"i": ctypes.c_int32, "l": ctypes.c_int64, "p": ctypes.c_void_p, "": None}
+"""Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
+_TYPES: Final = {
+    **{"i": ctypes.c_int32, "l": ctypes.c_int64, "f": ctypes.c_float, "p": ctypes.c_void_p},
+    **{"": None},
+}
 
 Floats = npt.NDArray[np.float32]
+PORTION: Final = 1 << 15  # rays of a call of the library, between which the time is checked,
+MANY: Final = 128  # and fewer where there are more objects than these
+NEVER: Final = float("inf")
 
 
 class KernelError(RenderError):
@@ -48,6 +67,20 @@ class Asked(NamedTuple):
     register: Array  # (R, M) as `Looks`
     owner: Array  # (M,) numbers of objects whose material holds, from 1; 0 for none
     met: int  # pairs of points and objects that met
+
+
+class Trails(NamedTuple):
+    """What M rays met."""
+
+    hit: Floats  # (M,) how far the first opaque surface is, inf where there is none
+    length: Floats  # (M,) world units in media before that or before the ray's end
+    soft: npt.NDArray[np.bool_]  # (M,) where a medium gives way to a surface: the distance is not 0 there
+    depth: Floats  # (M,) optical depth of those media
+    pieces: npt.NDArray[Any]  # `PIECE` rows of the ways in media, ray by ray and in order
+    near: int  # rays that pass a ball of something that draws
+    steps: int  # points of space at which the field was asked
+    lost: int  # rays that took all steps without coming to an end
+    met: int  # pairs of points and objects
 
 
 class Kernel:
@@ -104,8 +137,142 @@ class Kernel:
         assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
         distance, gradient = np.empty(count, np.float32), np.empty((3, count), np.float32)
         places = [part.ctypes.data for part in (numbers, points, distance, gradient)]
-        self._library.own(self.variant, tables.scene.ctypes.data, count, *places)
+        self._library.own(self.variant, tables.scene.ctypes.data, count, *places, None)
         return distance, gradient
+
+    def worn(self, tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]) -> Floats:
+        """Colours (3, M) of objects alone by their numbers (M,), from 0, at points (3, M), with textures."""
+        numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
+        count = len(numbers)
+        assert points.shape == (3, count)
+        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
+        result = np.empty((3, count), np.float32)
+        given = numbers.ctypes.data, points.ctypes.data, None, None, result.ctypes.data
+        self._library.own(self.variant, tables.scene.ctypes.data, count, *given)
+        return result
+
+    def rays(
+        self,
+        tables: Tables,
+        origin: Floats,
+        way: Floats,
+        limit: npt.NDArray[Any] | float,
+        begin: npt.NDArray[Any] | float = 0.0,
+        *,
+        gap: float,
+        steps: int = 800,
+        halvings: int = 16,
+        parted: bool = True,
+        until_s: float = NEVER,
+    ) -> Trails:
+        """Follow rays from an origin (3,), or one each (3, M), along unit directions (3, M), from ``begin``
+        (M,) up to a limit (M,), in so many steps at most.
+
+        Steps may pass what is certain, and what is thinner, by ``gap`` world units; ``halvings`` of an
+        interval find where a medium gives way to a solid. Ways in media are cut where their density, or
+        colour, changes; unless ``parted``, there are none, and depth alone is right. Raises `RenderError`
+        as `check_time` does.
+        """
+        origin, way = (np.ascontiguousarray(part, np.float32) for part in (origin, way))
+        count = way.shape[1]
+        assert way.shape == (3, count)
+        assert origin.shape in ((3,), (3, count))
+        begin, limit = (np.broadcast_to(np.asarray(part, np.float32), (count,)) for part in (begin, limit))
+        settings = gap, steps, halvings, int(parted)
+        found = []
+        for some in _portions(tables, count, until_s):
+            start = origin if origin.ndim == 1 else origin[:, some]
+            given = [np.ascontiguousarray(part) for part in (start, way[:, some], begin[some], limit[some])]
+            found.append(self._rays(tables, given, settings, parted))
+            found[-1].pieces["ray"] += some.start
+        if len(found) == 1:
+            return found[0]
+        joined: list[Any] = [
+            np.concatenate(parts) if isinstance(parts[0], np.ndarray) else sum(parts)
+            for parts in zip(*found, strict=True)
+        ]
+        return Trails(*joined)
+
+    def _rays(self, tables: Tables, given: list[Floats], settings: tuple[Any, ...], parted: bool) -> Trails:
+        """As `rays`, in one call of the library."""
+        count, many, scene = given[1].shape[1], given[0].ndim == 2, tables.scene.ctypes.data
+        hit, length, depth = (np.full(count, value, np.float32) for value in (np.inf, 0.0, 0.0))
+        soft, counts = np.zeros(count, np.int32), np.zeros(5, np.int64)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        places = [part.ctypes.data for part in given]
+        answers = [part.ctypes.data for part in (hit, length, soft, depth, counts)]
+        room = 2 * count if tables.scene["media"] and parted else 0
+        while True:
+            pieces = np.empty(room, PIECE)
+            rest = [*answers, pieces.ctypes.data, room, scratch.ctypes.data]
+            if count:
+                first = self.variant, scene, count, count if many else 1
+                self._library.rays(*first, *places, *settings, *rest)
+            found, lost, met, near, asked = counts.tolist()
+            if found <= room or not parted:
+                pieces = pieces[: min(found, room)]
+                pieces = pieces[np.argsort(pieces["ray"], kind="stable")]
+                return Trails(hit, length, soft != 0, depth, pieces, near, asked, lost, met)
+            room = found
+
+    def cones(
+        self, tables: Tables, at: Floats, radius: float, p: Floats, n: Floats, until_s: float = NEVER
+    ) -> tuple[Floats, int, int]:
+        """Shares (M,) of the light of a lamp at a point (3,) that come to points (3, M) outside of it through
+        what there is, all of it opaque, with distances up to `Tables`' reach; how many pass near something,
+        and pairs of points and objects.
+
+        Surfaces have normals n (3, M); in media, where one edge is enough, 0.
+        """
+        at, p, n = (np.ascontiguousarray(part, np.float32) for part in (at, p, n))
+        assert p.shape == n.shape == (3, p.shape[1])
+        way = p - at[:, None]
+        square = (way * way).sum(0)
+        far = np.sqrt(square.clip(1e-30))
+        spread = radius / np.sqrt((square - radius * radius).clip(1e-9))  # of half the angle
+        way, count, counts = way / far, len(far), np.zeros((2, 2), np.int64)
+        result, scene = np.ones(count, np.float32), tables.scene.ctypes.data
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        for some in _portions(tables, count, until_s):
+            parts = [part[..., some] for part in (way, far, spread, n)]
+            given = [np.ascontiguousarray(part, np.float32) for part in parts]
+            places = [part.ctypes.data for part in (*given, result[some], counts[0], scratch)]
+            start = scene, len(given[1]), at.ctypes.data, radius
+            self._library.cones(self.variant, *start, *places)
+            counts[1] += counts[0]
+        near, met = counts[1].tolist()
+        return result, near, met
+
+    def shade(
+        self, tables: Tables, stage: Rows, way: Floats, until_s: float = NEVER
+    ) -> tuple[Floats, tuple[int, ...]]:
+        """Radiance and alpha (4, rows, across) along unit ways (3, rows, across) from the eye of a `STAGE`
+        row, of opaque objects with plain colours. Counts are of rays from lamps, of rays near what draws,
+        of points, of pairs of points and objects, and of rays that came to no end.
+        """
+        way = np.ascontiguousarray(way, np.float32)
+        _, rows, across = way.shape
+        result, counts = np.empty((4, rows, across), np.float32), np.zeros((2, 5), np.int64)
+        given = tables.scene.ctypes.data, stage.ctypes.data
+        scratch = np.empty(self._library.scratch(self.variant, given[0]), np.uint8)
+        each = max(1, PORTION // max(1, across) // 16) * 16
+        for top in range(0, rows, each):
+            check_time(until_s)
+            some = np.ascontiguousarray(way[:, top : top + each])
+            part = np.empty((4, *some.shape[1:]), np.float32)
+            places = some.ctypes.data, part.ctypes.data, part[3].ctypes.data, counts[0].ctypes.data
+            self._library.shade(self.variant, *given, part[0].size, across, *places, scratch.ctypes.data)
+            result[:, top : top + each] = part
+            counts[1] += counts[0]
+        return result, tuple(counts[1].tolist())
+
+
+def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:
+    """Parts of so many rays, at least one; raises `RenderError` as `check_time` does before each."""
+    size = max(PORTION * MANY // max(int(tables.scene["objects"]), MANY), PORTION >> 6)
+    for begin in range(0, max(count, 1), size):
+        check_time(until_s)
+        yield slice(begin, min(begin + size, count))
 
 
 def _source() -> Any:
@@ -138,3 +305,14 @@ def load_kernel() -> Kernel:
     except (RuntimeError, OSError) as error:
         raise KernelError(str(error)) from None
     return Kernel(path)
+
+
+@cache
+def there_is_a_kernel() -> bool:
+    """Whether `load_kernel` has one; warns once where it has not, as all else is slow."""
+    try:
+        load_kernel()
+    except KernelError as error:
+        warnings.warn(f"{error}; torch draws solids in its place, slowly, and no skies", stacklevel=2)
+        return False
+    return True

@@ -33,7 +33,7 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import LAYOUTS, STRENGTHS, Layout, Parts
 from scenelang.compiler.program import STEPS as COLOUR_STEPS
 from scenelang.compiler.program import Paint, ProgramError
-from scenelang.compiler.spaces import EXTINCTION
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.assets import grid_shape, texture_of
 from scenelang.drawing.neural.frames import MOST, read_skins
@@ -41,7 +41,7 @@ from scenelang.drawing.solid.network import BLEND, Formula, SolidNetwork, Wanted
 from scenelang.drawing.solid.norms import Norms
 
 UNITS, LINES, WIDEST = 8, 27, 32  # of decoders at most
-DRAWS, CLIPS, BEGINS, BOXED, SKINNED, BUMPY, STOPS, MEDIUM = (1 << bit for bit in range(8))
+DRAWS, CLIPS, BEGINS, BOXED, SKINNED, BUMPY, STOPS, MEDIUM, WIDER = (1 << bit for bit in range(9))
 MAP, TURN_Z, TURN_Y = range(3)  # kinds of steps
 NORMS, SILU, GRID, GROWN, FORMULA = range(5)  # of decoders
 FORMULAS = ("sphere", "torus", "box", "cylinder", "cone", "capsule", "octahedron")  # those that are known
@@ -65,9 +65,20 @@ OBJECT = _dtype(
 )
 STEP = _dtype("i4 kind", "f4 twirl rate map[12]")
 DECODER = _dtype("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
-CELL = _dtype("f4 own[5] past[5] bias[5] candidate bump")
+CELL = _dtype("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
 TEXTURE = _dtype("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
-SCENE = _dtype("i4 objects groups deepest rows switched clipping", "u8 object step decoder cell texture")
+PIECE = _dtype("i4 ray", "f4 begin end before sigma")
+SCENE = _dtype(
+    "i4 objects groups deepest rows switched clipping media mixed hues dense coloured",
+    "f4 sigma reach",
+    "u8 object step decoder cell texture",
+)
+LAMP = _dtype("f4 at[3] power[3]")
+STAGE = _dtype(
+    "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift",
+    "i4 lamps grounded transparent glow",
+    "u8 lamp",
+)
 
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
 LOOSE = 0.03  # the same, per leaf unit, of one that grows
@@ -265,7 +276,7 @@ def _read_objects(
     adds = there.any(1) & ((cuts.sum(1) + (groups.tokens == SUBTRACT)) % 2 == 0)
     for flag, mask in (
         *((DRAWS, seen[0]), (CLIPS, clips), (BEGINS, groups.first), (SKINNED, skinned)),
-        *((BUMPY, amount != 0), (STOPS, seen[0] | adds)),
+        *((BUMPY, amount != 0), (STOPS, seen[0] | adds), (WIDER, wide)),
     ):
         rows["flags"] |= flag * mask.astype(np.int32)
     steps, rows["steps"] = ways.steps()
@@ -361,6 +372,21 @@ def read_looks(network: SolidNetwork, parts: Parts, worn: Mask, draws: Mask) -> 
     return Looks(np.concatenate(rows), hues, len(switched), density, sigma, glowing, rough)
 
 
+def stage_rows(stage: Stage, gap: float, glowing: bool) -> tuple[Rows, Rows]:
+    """The `STAGE` row of direct light, and the `LAMP` rows that it points to; ``gap`` of `MarchSettings`."""
+    lamps = np.zeros(len(stage.lights), LAMP)
+    for row, light in zip(lamps, stage.lights, strict=True):
+        row["at"], row["power"] = light.position, light.power * np.array(light.rgb)
+    result, ground = np.zeros((), STAGE), stage.ground
+    result["eye"], result["horizon"], result["zenith"] = stage.camera.eye, stage.horizon, stage.zenith
+    if ground is not None:
+        result["grounded"], result["ground"], result["floor"] = 1, ground.rgb, ground.y
+    result["gap"], result["ambient"], result["fade"] = gap, AMBIENT, FADE
+    result["nearest"], result["lift"], result["transparent"] = NEAREST, LIFT, stage.transparent
+    result["glow"], result["lamps"], result["lamp"] = 3 * glowing, len(lamps), lamps.ctypes.data
+    return result, lamps
+
+
 class Tables:
     """What the kernel takes of a scene; keeps the arrays that the `SCENE` row points to.
 
@@ -386,6 +412,10 @@ class Tables:
         self.objects = read_objects(vectors, network.layout, groups, widths, reach)
         rows = self.objects.rows
         self._kept: list[Any] = []  # what tables point to
+        self.detail = np.zeros(
+            count, np.float32
+        )  # texels that a way of a world unit may cross; 0 without any
+        self.edged = False  # whether a decoder shows edges, which rays may clip
         with network.xp.inference():
             draws = self.objects.flagged(DRAWS)
             textures = self._textures(paints or none, parts.texture, draws)
@@ -396,9 +426,13 @@ class Tables:
         rows["look"][:, : len(register)] = register.T
         rows["flags"] |= MEDIUM * (register[-1] > 0.5)
         clipping = bool(self.objects.flagged(CLIPS).any())
+        kinds = register[-1] > 0.5
         sizes = count, len(groups.joins), groups.deepest, len(register), self.looks.switched, clipping
+        hues, sigma = self.looks.hues, self.looks.sigma
+        coloured = bool(kinds.any()) and np.ptp(register[hues - 3 : hues, kinds], 1).max() > 0
+        mixed = bool(kinds.any()), bool(kinds.any() and not kinds.all()), hues, sigma is None, coloured
         tables = map(self._held, (rows, self.objects.steps, self.decoders, cells, textures))
-        self.scene = np.array((*sizes, *tables), SCENE)
+        self.scene = np.array((*sizes, *mixed, sigma or 0.0, reach, *tables), SCENE)
 
     def _held(self, array: npt.NDArray[Any]) -> int:
         """The address of an array that is kept; raises `ProgramError` where a number of it is none."""
@@ -418,6 +452,7 @@ class Tables:
             assert paint is not None
             texture: Any = texture_of(network.xp, paint, frames[i], network.codes, light=True)
             row["place"] = np.array(texture.place.rows).reshape(-1)
+            self.detail[i] = texture.detail / self.objects.rows["scale"][i]
             if isinstance(paint.element, Gradient):
                 stops = paint.element.stops
                 row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR
@@ -449,6 +484,7 @@ class Tables:
                 continue
             decoder: Any = network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
             sides.append(network.box(decoder))
+            self.edged |= network.edged(decoder)
             if isinstance(decoder, Formula):
                 row["kind"], row["width"] = FORMULA, FORMULAS.index(decoder)
             elif isinstance(decoder, Norms):
@@ -500,6 +536,7 @@ def _cells(network: SolidNetwork, groups: Groups, widths: Floats) -> Rows:
     for row, (token, width) in zip(result, known.tolist(), strict=True):
         cut = token >= SUBTRACT and width
         cell = network.cut(int(token), width) if cut else network.cell(int(token), width or BLEND)
+        row["smooth"] = token == SMOOTH
         for name, part in cell[Wanted.ALL]._asdict().items():
             values = np.asarray(network.xp.to_numpy(part)).reshape(-1)
             row[name] = values if len(values) > 1 else values[0]
