@@ -12,7 +12,6 @@ out ambient light, the fade and the sky; it draws by vectors where there is an L
 from __future__ import annotations
 
 import argparse
-import copy
 import hashlib
 import resource
 import statistics
@@ -99,15 +98,8 @@ class Net(NamedTuple):
 
 
 def nets() -> dict[str, Net]:
-    """The shipped network, the same where every ray is marched, and formulas."""
-    network = load_arrays(MODEL).network
-    marched = copy.copy(network)
-    marched.__dict__["segment_w"] = []
-    return {
-        "network": Net(network),
-        "marched": Net(marched, samples=("adaptive",)),
-        "formulas": Net(closed_forms(MODEL)),
-    }
+    """The shipped network and formulas."""
+    return {"network": Net(load_arrays(MODEL).network), "formulas": Net(closed_forms(MODEL))}
 
 
 def ours(known: dict[str, Net], scene: Scene) -> Renderer:

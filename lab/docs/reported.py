@@ -78,8 +78,7 @@ def decoders(sizes: Mapping[str, int]) -> str:
     """Layers of a network's decoders by the sizes in its weights."""
     if "units" not in sizes:
         return f"2, {sizes['decoder_width']}, {sizes['decoder_width']}, 1"
-    own = f"{FEATURES} features, {LINES * (sizes['units'] + 1)} lines, {sizes['units']} norms, 1"
-    return f"{own}; ways 5, {sizes['segment']}, {sizes['segment']}, 1"
+    return f"{FEATURES} features, {LINES * (sizes['units'] + 1)} lines, {sizes['units']} norms, 1"
 
 
 def budgets() -> str:

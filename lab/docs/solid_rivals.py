@@ -14,7 +14,6 @@ SETS = {"diffuse": "diffuse", "solids3d": "solids and media"}
 TITLES = {
     OURS: "network",
     "formulas, adaptive": "formulas",
-    "marched, adaptive": "network, all marched",
 }
 COLOURS = {
     "network": "#1f77b4",

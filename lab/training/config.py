@@ -59,7 +59,6 @@ class SolidsConfig:
     model: str  # name of the model that the weights are for
     seed: int  # seeds parameters and points
     cell: int  # steps of Adam for the cell
-    segments: int  # steps of Adam for the answers for whole segments
     network: SolidConfig  # sizes
 
 
@@ -73,7 +72,7 @@ def config_data(name: str) -> bytes:
 
 def is_solids(data: bytes) -> bool:
     """Return whether a configuration is a `SolidsConfig`."""
-    return b'"segments"' in data
+    return b'"solids3d"' in data
 
 
 def read_solids_config(name: str) -> SolidsConfig:

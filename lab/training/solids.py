@@ -2,8 +2,7 @@
 
 Each leaf's norm units are fitted by themselves (`norms.py`); the weights become, of all that do, the smallest
 that make them out of the leaves' codes. The cell learns the fold from random pairs of distances, close to
-equal at all scales. Answers for whole segments, of leaves that are round about y and their own mirror image
-in it, come last and change none of the others.
+equal at all scales.
 """
 
 from __future__ import annotations
@@ -20,18 +19,19 @@ from torch import Tensor
 from lab.about import revision
 from lab.training.checkpoint import check_config, load_tensors, save_tensors
 from lab.training.config import SolidsConfig
-from lab.training.leaves import LEAVES, half_rays
 from lab.training.loop import Report, schedule
 from lab.training.norms import SIZES, fitted
 from scenelang.assets.files import write_whole
 from scenelang.drawing.exact.field import combine
 from scenelang.drawing.neural.load import Solids
 from scenelang.drawing.solid.network import BLEND, Wanted
+from scenelang.language import words
 from scenelang.language.words import TOKENS
 
+LEAVES = (*words.LEAVES[3],)
 MATERIALS = {"diffuse": (1.0, 1.0, 1.0, 0.0), "volumetric": (1.0, 1.0, 1.0, 1.0)}  # albedo and medium
 BEGINNINGS = 6  # of the cell
-SEEDS = (0, 1, 32)  # of the parts: cell, leaves and segments, the last as when decoders took thirty parts
+SEEDS = (0, 1)  # of the parts: cell and leaves
 CODES = {
     "sphere": (0.55890197, 0.14959463, 0.10143978, 0.6335122),
     "torus": (-0.5625774, -0.033415865, -1.4781343, 0.38490954),
@@ -68,44 +68,6 @@ def _write(network: Solids, part: Tensor, goal: Tensor) -> None:
     old = part.double().reshape(len(part), -1)
     goal = goal.double().reshape(len(goal), -1)
     part.copy_((old + torch.linalg.pinv(one) @ (goal - one @ old)).view(part.shape))
-
-
-def fit_segments(network: Solids, steps: int, g: torch.Generator, points: int = 2048) -> float:
-    """Fit the answers for whole segments of the first leaves; returns the last tenth's mean squared error."""
-    leaves = LEAVES[: network.config.answered]
-    chunks = [[half_rays(leaf, 20_000, g) for leaf in leaves] for _ in range(min(10, 1 + steps // 100))]
-    told = torch.cat([torch.stack([x.T for x, _ in chunk]) for chunk in chunks], 1)  # (leaves, M, 5)
-    length = torch.cat([torch.stack([y for _, y in chunk]) for chunk in chunks], 1)
-    parts = _segments(network)
-    sizes = [(len(leaves), *part.shape[1:]) for part in parts]
-    fitted = [
-        (torch.randn(size, generator=g) * (size[1] ** -0.5 if len(size) > 2 else 0.3)).requires_grad_()
-        for size in sizes
-    ]
-    optimiser = torch.optim.Adam(fitted, lr=0.01, betas=(0.9, 0.99), fused=True)
-    last, error = max(1, steps // 10), 0.0
-    for step in range(steps):
-        optimiser.param_groups[0]["lr"] = 0.01 * schedule(step, steps)
-        some = torch.randint(0, told.shape[1], (points,), generator=g)
-        x = told[:, some]
-        for i, (w, b) in enumerate(zip(fitted[:3], fitted[3:], strict=True)):
-            x = torch.baddbmm(b[:, None], x, w)
-            if i < 2:
-                x = torch.nn.functional.silu(x)
-        loss = (x[..., 0] - length[:, some]).square().mean(1).sum()
-        optimiser.zero_grad()
-        loss.backward()  # type: ignore[no-untyped-call]
-        optimiser.step()
-        if step >= steps - last:
-            error += loss.item() / len(leaves) / last
-    with torch.no_grad():
-        for part, goal in zip(parts, fitted, strict=True):
-            _write(network, part, goal)
-    return error
-
-
-def _segments(network: Solids) -> list[torch.nn.Parameter]:
-    return [*network.segment_w, *network.segment_b]
 
 
 def fit_cell(network: Solids, steps: int, g: torch.Generator) -> float:
@@ -188,7 +150,6 @@ def train_solids(
     parts: list[tuple[int, Callable[[int, torch.Generator], dict[str, float]]]] = [
         (config.cell, lambda steps, g: {"cell": fit_cell(network, steps, g)}),
         (len(SIZES), lambda _, g: fit_leaves(network, config.seed, g)),
-        (config.segments, lambda steps, g: {"segments": fit_segments(network, steps, g)}),
     ]
     reached: dict[str, float] = {}  # the errors and losses of parts
     done, spent_s = 0, 0.0

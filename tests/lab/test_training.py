@@ -13,11 +13,10 @@ import torch
 
 from lab.training.checkpoint import load_tensors
 from lab.training.config import Phase, SolidsConfig, TrainConfig
-from lab.training.leaves import half_rays
 from lab.training.loop import train
 from lab.training.norms import NormStart, fitted
 from lab.training.scenes import GEOMETRIES, Batch, SceneConfig, random_batch
-from lab.training.solids import fit_cell, fit_segments, train_solids
+from lab.training.solids import fit_cell, train_solids
 from scenelang.compiler.geometries import GEOMETRIES as GEOMETRY
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.files import solid_arrays
@@ -134,8 +133,8 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
 
-NORMS = SolidConfig(units=2, hidden=8, segment=4, answered=2)
-TINY = SolidsConfig("solids3d", 3, 4, 4, NORMS)
+NORMS = SolidConfig(units=2, hidden=8)
+TINY = SolidsConfig("solids3d", 3, 4, NORMS)
 
 
 def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
@@ -150,9 +149,8 @@ def test_a_stopped_training_goes_on_as_if_it_had_not(tmp_path: Path, monkeypatch
     )
     assert (one.codes == two.codes).all()
     assert (one.lines == two.lines).all()
-    assert (one.segment_w[1] == two.segment_w[1]).all()
-    assert told[0] == (0, 15)
-    assert told[-1] == (15, 15)
+    assert told[0] == (0, 11)
+    assert told[-1] == (11, 11)
     with pytest.raises(ValueError, match="another configuration"):
         train_solids(replace(TINY, seed=4), tmp_path / "one")
 
@@ -161,7 +159,6 @@ def test_every_part_of_the_training_learns() -> None:
     torch.manual_seed(1)
     network, g = Solids(NORMS, 7, 2), torch.Generator().manual_seed(1)
     assert fit_cell(network, 300, g) < fit_cell(Solids(SolidConfig(), 2, 2), 1, g) / 2
-    assert fit_segments(network, 60, g, 256) < fit_segments(network, 2, g, 256)
 
 
 @pytest.mark.parametrize("leaf", ["torus", "octahedron"])
@@ -172,11 +169,3 @@ def test_norm_units_come_out_right(leaf: str) -> None:
     decoder = norms(NUMPY, lines, np.float64(radius), 3.0)
     p = np.random.default_rng(1).uniform(-1.5, 1.5, (3, 1000))
     np.testing.assert_allclose(answers(NUMPY, p, decoder, False)[0], GEOMETRY[leaf].distance(p), atol=1e-6)
-
-
-def test_half_rays_are_as_long_in_a_sphere_as_in_closed_form() -> None:
-    told, length = half_rays("sphere", 500, torch.Generator().manual_seed(1))
-    p = torch.stack([told[0], 0 * told[0], told[1]])
-    ahead = (p * told[2:]).sum(0)
-    chord = (ahead.square() - p.square().sum(0) + 1).clip(0.0).sqrt() - ahead
-    assert (length - chord).abs().max() < 1e-4
