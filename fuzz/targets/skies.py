@@ -38,7 +38,7 @@ def check(data: bytes) -> None:
     with warnings.catch_warnings():
         warnings.simplefilter("error")
         try:
-            picture = render(program, device="cpu", threads=1)
+            picture = render(program, threads=1)
         except RenderError as error:
             hold(False, "what compiles is drawn", error)
     taken_s = time.process_time() - before_s

@@ -23,6 +23,7 @@ from scenelang.compiler.weights import ModelError
 from scenelang.drawing.closed import field_of
 from scenelang.drawing.how import Device, RenderError, Samples, keep_memory, threads_for
 from scenelang.drawing.image import Image
+from scenelang.drawing.kernel import there_is_a_kernel
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
 from scenelang.drawing.work import work_ms
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
@@ -46,7 +47,7 @@ def choose_drawer(
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     if renderer == "solid":
-        return "numpy", "solids are"
+        return ("numpy", "solids are") if there_is_a_kernel() else ("torch", "there is no kernel")
     if renderer != "framed":
         return "torch", f"a `{renderer}` network is large work for any picture"
     ms = work_ms(program, samples)

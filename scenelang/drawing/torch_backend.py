@@ -68,7 +68,7 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
 
     Without ``skip`` points that an object cannot reach are asked too; no pixel measured differed by 0.001.
     Raises `RenderError` where the Program is of another model or other weights, its vectors are not those of
-    a compiled scene, or the model does not draw in this way.
+    a compiled scene, it has a sky, or the model does not draw in this way.
     """
     name, network = model.manifest.name, model.network
     if program.model != name:
@@ -82,6 +82,9 @@ def draw_program(program: Program, model: Model, *, skip: bool = True, **run: Un
         torch.set_num_threads(1)  # set around the pool, whose threads take it over
         try:
             program.check_weights(model.digest)
+            if program.stage is not None and program.stage.sky is not None:
+                fact = "light from everywhere (sky) is drawn by the kernel alone"
+                raise RenderError(f"{fact}; leave out --device")
             if isinstance(network, Framed | Solids):
                 drawing = draw_objects(network, program, skip=skip, **run)
                 drawing.image.credit = credit_of(program.elements)

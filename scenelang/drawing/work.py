@@ -103,9 +103,9 @@ _NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
 
 `python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.
 """
-_SOLID_NS: Final = (5e7, 3e5, 3000.0, 300.0, 0.0)
+_SOLID_NS: Final = (6e6, 1e4, 600.0, 12.0, 0.0)
 """The like for solids."""
-LIGHT_MS: Final = 3e-4  # for an evaluation of what comes from the sky
+LIGHT_MS: Final = 1.5e-4  # for an evaluation of what comes from the sky
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Shares of that for other ways to sample."""
 _REFINED: Final = 0.1, 6.0  # share of the pixels of solids that take all samples, and more along a side
@@ -127,7 +127,7 @@ def work_ms(program: Program, samples: Samples = "adaptive", load: Load | None =
 
 BOUND_S, LEAST_S = 300.0, 45.0  # processor seconds that a picture of 256 x 256 may take, and the smallest
 SURE: Final = 0.5  # of these; where more is foretold, a picture is drawn coarser
-EASY: Final = 1 << 22  # objects times pixels and lamps of solids without a sky that never take long
+EASY: Final = 1 << 24  # objects times pixels and lamps of solids without a sky that never take long
 COARSER: Final = (1, 2, 4, 8)  # pixels across that one stands for
 
 

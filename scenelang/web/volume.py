@@ -59,7 +59,7 @@ def volume(
         field = SolidField(network, program.vectors, program.tokens, brought, paints)
         lighting = Lighting(field, stage, MARCH_SETTINGS["adaptive"])
         around = _open(lighting) if detail is OPEN else arriving(lighting)
-        low, high = box_of(field, np.ones(len(field.solids)))
+        low, high = box_of(field, np.ones(len(field)))
         if ground is not None:
             low[1] = min(max(low[1], ground.y), high[1])
         sizes = (high - low).clip(1e-3)

@@ -9,6 +9,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
+from scenelang.drawing.solid.passes import read_solids
 
 from scenelang.compiler import spaces
 from scenelang.compiler import steps as affine
@@ -21,7 +22,6 @@ from scenelang.compiler.spaces import SPACES, Camera, Ground, Light, Stage, deco
 from scenelang.compiler.steps import IDENTITY, Affine, Displace, Grow, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.solid import ExactBody
-from scenelang.drawing.solid.passes import read_solids
 from scenelang.drawing.tables import read_objects
 from scenelang.language import words
 

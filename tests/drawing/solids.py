@@ -19,11 +19,12 @@ from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage, Triple
 from scenelang.compiler.steps import Affine, Displace, Grow, Shell, Step, Twist, Warp, composed
 from scenelang.compiler.weights import open_weights, shipped_weights
+from scenelang.drawing.kernel import Asked
 from scenelang.drawing.neural.files import solid_arrays
 from scenelang.drawing.neural.load import Solids
-from scenelang.drawing.solid.field import Meeting, SolidField
-from scenelang.drawing.solid.network import SolidArrays, SolidNetwork, Wanted
-from scenelang.drawing.solid.passes import END, INF, OBJECT, SLOT, WAY, Passes
+from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.network import SolidArrays, SolidNetwork
+from scenelang.drawing.solid.plain import solid_field
 from scenelang.language import words
 from scenelang.language.words import BLEND, COMBINE, TOKENS, Combine
 
@@ -142,20 +143,14 @@ def field(objects: Sequence[Object], net: SolidNetwork | None = None) -> SolidFi
     net = net or network()
     vectors = np.reshape([vector(o, net) for o in objects], (-1, 64)).astype(np.float32)
     tokens = np.array([TOKENS[o.token] for o in objects], np.int8)
-    return SolidField(net, vectors, tokens, paints=[o.paint for o in objects])
+    return solid_field(net, vectors, tokens, paints=[o.paint for o in objects])
 
 
-def everywhere(solids: SolidField, p: np.ndarray, gradient: bool = False, owners: bool = False) -> Meeting:
-    """What a field answers where every object is met."""
-    xp, like, count = solids.xp, solids.network.codes, len(solids.solids)
-    slots = np.zeros((SLOT, count, p.shape[1]), np.float32)
-    drawn = np.array([solid.draws for solid in solids.solids])
-    slots[OBJECT] = np.where(drawn, np.arange(count), -1 - np.arange(count))[::-1, None]
-    slots[WAY] = np.einsum("ijn,jp->inp", xp.to_numpy(solids.linear), p)[:, ::-1]
-    slots[END] = INF
-    passes = Passes(xp.array(slots, like), solids.shift)
+def everywhere(solids: SolidField, p: np.ndarray, reach: float = 1e6) -> Asked:
+    """What a field answers at points (3, M), within a reach or where every object is met."""
+    xp, like = solids.xp, solids.network.codes
     with xp.inference():
-        return solids.meet(passes, xp.array(np.ones_like(p[0]), like), Wanted.ALL, gradient, owners=owners)
+        return solids.near(xp.array(np.float32(p), like), reach, every=True)
 
 
 MIXED = (
@@ -263,7 +258,7 @@ def tree_field(tree: Tree | Sequence[Row], net: SolidNetwork | None = None) -> S
     net, stream = net or network(), rows(tree) if isinstance(tree, Tree) else tree
     vectors = np.array([vector(row.o._replace(k=0.0), net) for row in stream])
     vectors[:, LAYOUT.places.width] = [row.k for row in stream]
-    return SolidField(net, vectors, np.array([row.token for row in stream], np.int8))
+    return solid_field(net, vectors, np.array([row.token for row in stream], np.int8))
 
 
 def tree_graph(node: Tree) -> Fold:

@@ -13,7 +13,7 @@ from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.soft import ASIDE, WIDE, shown
+from scenelang.drawing.solid.soft import ASIDE, WIDE
 from tests.drawing.solids import Object, field, moved, scaled
 
 BALL = Object("sphere", (scaled(0.7),), rgb=(0.8, 0.5, 0.3))
@@ -73,14 +73,14 @@ def test_a_corner_sees_half_of_the_sky(off: float) -> None:
 def test_fields_are_asked_in_single_precision(monkeypatch: pytest.MonkeyPatch) -> None:
     """A mask times a number is double in numpy, and all that it joins; that takes half as long again."""
     found: set[str] = set()
-    before = SolidField.meet
+    before = SolidField.near
 
-    def meet(field: SolidField, *args: Any, **more: Any) -> Any:
+    def near(field: SolidField, *args: Any, **more: Any) -> Any:
         result = before(field, *args, **more)
         found.add(str(result.distance.dtype))
         return result
 
-    monkeypatch.setattr(SolidField, "meet", meet)
+    monkeypatch.setattr(SolidField, "near", near)
     nsg.render(
         nsg.compile(
             nsg.loads("""nsg 1; canvas(64, 64); sky(1); light([2, 3, 1], 9, radius = 0.5);
@@ -292,7 +292,7 @@ def test_a_soft_lamp_behind_several_things_is_hidden_by_all(balls: list[Any], of
     n = np.tile([[0.0], [0.0], [1.0]], 21)
     solids = field(objects).opaque((ASIDE + WIDE) * radius)
     with solids.xp.inference():
-        share = shown(solids, np.float32(lamp), radius, np.float32(p), np.float32(n))[0]
+        share = solids.shown(np.float32(lamp), radius, np.float32(p), np.float32(n))[0]
     r, turn = np.sqrt((np.arange(4000) + 0.5) / 4000), 2.399963 * np.arange(4000)
     disc = lamp[:, None] + radius * np.stack([r * np.cos(turn), r * np.sin(turn), 0 * r])
     way = disc[:, None] - p[:, :, None]  # (3, 21, 4000)
@@ -315,7 +315,7 @@ def test_a_sharp_rim_hides_small_lamps_too(radius: float) -> None:
     n = np.tile([[0.0], [1.0], [0.0]], 301)
     solids = field([flat]).opaque((ASIDE + WIDE) * radius)
     with solids.xp.inference():
-        share = shown(solids, np.float32(lamp), radius, np.float32(p), np.float32(n))[0]
+        share = solids.shown(np.float32(lamp), radius, np.float32(p), np.float32(n))[0]
     r, turn = radius * np.sqrt((np.arange(2000) + 0.5) / 2000), 2.399963 * np.arange(2000)
     free = []
     for at in p.T:

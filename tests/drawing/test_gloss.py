@@ -15,7 +15,7 @@ from scenelang.drawing.closed import closed_forms
 from scenelang.drawing.solid.around import Around
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
-from tests.drawing.solids import Object, moved, network, scaled, torch_network, vector
+from tests.drawing.solids import Object, moved, network, scaled, vector
 from tests.drawing.test_light import reflected
 
 DARK = Sky(0.0, (0.0, 0.0, 0.0), (0.0, 0.0, 0.0))
@@ -38,11 +38,11 @@ def seen(
         return np.asarray(field.xp.to_numpy(lighting.shade(way).radiance))
 
 
-@pytest.mark.parametrize("library", ["closed", "numpy", "torch"])
+@pytest.mark.parametrize("library", ["closed", "numpy"])
 @pytest.mark.parametrize("rough", [0.1, 0.4, 1.0, -0.05, -0.4, -1.0])
 def test_lobes(rough: float, library: str) -> None:
     """A ball under an even sky, and by two lamps, each beside and before what it mirrors."""
-    net = {"closed": None, "numpy": network(), "torch": torch_network()}[library]
+    net = {"closed": None, "numpy": network()}[library]
     ball, rgb = [Object("sphere", rgb=RGB)], np.array(RGB)
     eye, n = np.array([1.2, 0.0, 6.0]), np.array([0.0, 0.0, 1.0])
     v = (eye - n) / np.linalg.norm(eye - n)
@@ -73,8 +73,7 @@ def test_lobes(rough: float, library: str) -> None:
         assert arriving(soft) == pytest.approx(expected, rel=0.05, abs=2e-3)
 
 
-@pytest.mark.parametrize("net", [network, torch_network])
-def test_mirrors_show_what_is_there(net: Any) -> None:
+def test_mirrors_show_what_is_there() -> None:
     """A smooth wall shows a ball that glows where it is mirrored, not beside it, also by a second wall."""
     wall = Object("box", (scaled(3.0, 3.0, 0.5), moved(0.0, 0.0, -0.5)), rgb=(1.0, 1.0, 1.0))
     other = Object("box", (scaled(3.0, 3.0, 0.5), moved(0.0, 0.0, 4.5)), rgb=(1.0, 1.0, 1.0))
@@ -84,7 +83,9 @@ def test_mirrors_show_what_is_there(net: Any) -> None:
     # behind the wall, beside that, and behind the wall and its image of the other one
     to = np.array([(0.6, 0.0, -1.5), (1.5, 0.0, -1.5), (0.6, 0.0, -6.5)]) - eye
     d = (to / np.linalg.norm(to, axis=1)[:, None]).T
-    light = seen([wall, ball, other], [-0.05, 0.0, -0.05], stage, d, net(), [(0.0,) * 3, glow, (0.0,) * 3])
+    light = seen(
+        [wall, ball, other], [-0.05, 0.0, -0.05], stage, d, network(), [(0.0,) * 3, glow, (0.0,) * 3]
+    )
     assert light[:, 0] == pytest.approx(glow, rel=0.03)
     assert light[:, 1].max() < 0.03
     assert light[:, 2] == pytest.approx(glow, rel=0.05)

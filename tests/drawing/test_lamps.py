@@ -14,7 +14,7 @@ from scenelang.compiler.steps import Shell
 from scenelang.drawing.closed import closed_forms
 from scenelang.drawing.solid.draw import Lighting, Points
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.plain import solid_field
 from tests.drawing.light_oracle import Oracle
 from tests.drawing.solids import (
     Object,
@@ -41,7 +41,7 @@ def field_of(
     if glow:
         vectors[:, PLACES.glow] = glow
     tokens = np.array([{"union": 0, "smooth": 1, "subtract": 2, "intersect": 3}[o.token] for o in objects])
-    return SolidField(net, vectors, tokens.astype(np.int8))
+    return solid_field(net, vectors, tokens.astype(np.int8))
 
 
 def some_ways(stage: Stage, count: int, spread: float = 1.1) -> np.ndarray:
@@ -102,7 +102,7 @@ def test_a_dense_ball_in_thin_media_is_as_deep_as_its_chords(library: str) -> No
     way = np.tile(np.float32([[0], [0], [-1]]), 30)
     with field.xp.inference():
         rays = (field.xp.array(part, like) for part in (begin, way, np.full(30, 10, np.float32)))
-        depth = field.xp.to_numpy(march(field, *rays).depth)
+        depth = field.xp.to_numpy(field.march(*rays, gap=0.009).depth)
     assert depth == pytest.approx(0.1 * 4 + 4.9 * 2 * np.sqrt(0.09 - off * off), abs=0.05)
 
 
@@ -150,9 +150,8 @@ def received(objects: list[Object], lamp: Light, p: np.ndarray, n: np.ndarray) -
     lighting = Lighting(field_of(objects or [FAR]), Stage(lights=(lamp,)))
     colour = np.ones((3, p.shape[1]), np.float32)
     points = Points(p.astype(np.float32), n.astype(np.float32), 0 * colour, colour)
-    none = march(lighting.field, lighting.eye, p[:, :0].astype(np.float32), p[0, :0].astype(np.float32))
     with lighting.xp.inference():
-        return np.asarray(lighting._lit(points, p[0, :0], none)[0])
+        return np.asarray(lighting._lit(points, p[0, :0])[0])
 
 
 def test_a_sphere_partly_below_the_horizon() -> None:

@@ -10,7 +10,7 @@ from scipy.special import exp1
 
 from scenelang.compiler.spaces import Ground, Light, Sky, Stage
 from scenelang.drawing.solid.mist import Mist, _aside
-from tests.drawing.solids import Object, everywhere, moved, network, scaled, torch_network
+from tests.drawing.solids import Object, everywhere, moved, scaled
 from tests.drawing.test_lamps import field_of
 
 WHITE = (1.0, 1.0, 1.0)
@@ -141,16 +141,3 @@ def test_media_let_through_what_their_depth_says():
     for reach, inside in ((10.0, 2.0), (3.0, 1.0), (1.5, 0.0)):
         _, clear = mist.along(p, way, np.array([reach], np.float32))
         assert clear[0] == pytest.approx(np.exp(-1.5 * inside * 0.995), rel=0.05)
-
-
-def test_both_libraries_find_the_same_light():
-    objects = [Object("torus", (), "volumetric", GREY), Object("box", (scaled(0.3),), "diffuse", GREY)]
-    stage = Stage(lights=(Light(),), ground=Ground(), sky=Sky())
-    p = np.random.default_rng(0).uniform(-0.8, 0.8, (3, 50)).astype(np.float32)
-    seen = []
-    for net in (network(), torch_network()):
-        field = field_of(objects, density=(20.0, 3.0), net=net)
-        with field.xp.inference():
-            light = Mist(field, stage).medium(field.xp.array(p, net.codes))
-            seen.append(np.asarray(field.xp.to_numpy(light)))
-    np.testing.assert_allclose(*seen, atol=1e-4)

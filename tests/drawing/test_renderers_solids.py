@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -13,7 +12,7 @@ from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.program import Paint
 from scenelang.compiler.spaces import EXTINCTION, Camera, Light, Stage
-from scenelang.compiler.steps import Affine, Displace, Step, Twist
+from scenelang.compiler.steps import Affine
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.exact.field import combine, leaf_distance
 from scenelang.drawing.exact.solid import ExactField, solid_image
@@ -21,9 +20,7 @@ from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.solid import draw
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import march
 from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted, element_box, surrounding
-from scenelang.drawing.solid.passes import BEGIN, END, RATE
 from scenelang.drawing.tables import SLACK
 from scenelang.language.words import TOKENS
 from tests.assets.shapes import element, noise, torus
@@ -52,7 +49,7 @@ def test_leaves_are_exact_near_their_surfaces(leaf: str) -> None:
     q = rng.uniform(-1.2, 1.2, (3, 20000))
     exact = leaf_distance(leaf, q)
     q, exact = q[:, abs(exact) < 0.05], exact[abs(exact) < 0.05]
-    found = everywhere(field([Object(leaf)]), q.astype(np.float32), gradient=True)
+    found = everywhere(field([Object(leaf)]), q.astype(np.float32))
     assert abs(found.distance - exact).mean() < 6e-4
     h = 1e-5
     normal = np.stack([leaf_distance(leaf, q + h * e[:, None]) - exact for e in np.eye(3)]) / h
@@ -85,7 +82,7 @@ def test_the_cell_is_the_fold(token: str) -> None:
 
 def test_gradients_are_those_of_the_distance() -> None:
     solids, p, h = field(MIXED), rng.uniform(-1, 1, (3, 400)).astype(np.float32), 2e-3
-    found = everywhere(solids, p, gradient=True)
+    found = everywhere(solids, p)
     steps = h * np.eye(3, dtype=np.float32)[..., None]
     slopes = [
         (everywhere(solids, p + step).distance - everywhere(solids, p - step).distance) / (2 * h)
@@ -103,12 +100,14 @@ def test_steps_pass_no_surface() -> None:
     way = rng.normal(size=(3, 3000)).astype(np.float32) * 0.1 - origin[:, None]
     way /= np.linalg.norm(way, axis=0)
     t = rng.uniform(3, 5, 3000).astype(np.float32)
-    met, passes = solids.passes(origin, way, t + 10)
-    a, b = (everywhere(solids, (origin[:, None] + way * at)[:, met]).distance for at in (t, t + 0.02))
-    begin, end, rate = passes.slots[BEGIN], passes.slots[END], passes.slots[RATE]
-    assert len(met) > 1000
-    inside = (begin <= t[met]) & (t[met] + 0.02 <= end)
-    bound = (rate * inside).max(0)
+    a, b = (everywhere(solids, origin[:, None] + way * at).distance for at in (t, t + 0.02))
+    bound = 0 * t
+    for row in solids.objects.rows:
+        linear, shift = row["map"][:9].reshape(3, 3), row["map"][9:, None]
+        ends = [linear @ (origin[:, None] + way * at) + shift for at in (t, t + 0.02)]
+        inside = np.linalg.norm(ends, axis=1).max(0) <= row["ball"]
+        bound = np.maximum(bound, inside * row["rate"] * np.linalg.norm(linear @ way, axis=0))
+    assert (bound > 0).sum() > 1000
     assert (abs(a - b) / 0.02 <= bound + 1e-3)[bound > 0].all()
 
 
@@ -185,13 +184,6 @@ def test_what_a_sphere_takes() -> None:
     assert work.met == pytest.approx(work.steps + seen, abs=8)
 
 
-APART = [
-    Object("torus", (scaled(0.9, 0.6, 0.9), turned(0.7), moved(-0.8, 0.2, 0))),
-    Object("sphere", (Displace(0.05, 5.0), scaled(0.5), moved(0.9, 0.3, 0.4)), "volumetric"),
-    Object("torus", (Twist(0.8), scaled(0.6), moved(0.2, -0.4, 0.9)), rgb=(0.2, 0.5, 0.8)),
-]
-
-
 @pytest.mark.parametrize("leaf", LEAVES)
 def test_boxes_are_those_of_the_leaf(leaf: str) -> None:
     net = network()
@@ -222,29 +214,6 @@ def test_boxes_of_elements_hold_all_nodes_inside() -> None:
     assert (places.min(1) >= box[0]).all()
     assert (places.max(1) <= box[1]).all()
     assert (box[1] - box[0]).min() < 1.5
-
-
-@pytest.mark.parametrize("objects", [APART, MIXED])
-def test_asking_a_decoder_alone_is_asking_the_cell(objects: list[Object]) -> None:
-    """Pictures are the same where nothing is known of the cell, so that it is asked for each object."""
-    alone, asked = field(objects), field(objects)
-    assert alone.open
-    assert (alone.group >= 0).any()
-    asked.open, asked.group = False, 0 * asked.group - 1
-    (mine, work), (other, more) = (draw_solids(solids, Stage(), (64, 48)) for solids in (alone, asked))
-    assert abs(mine - other).max() < 2e-4
-    assert work.met == pytest.approx(more.met, rel=0.05)
-
-
-def test_gates_that_may_not_be_open_are_asked() -> None:
-    net, reach = network(), np.ones(1, np.float32)
-    cell = net.cell(0, 0.15)[Wanted.ALL]
-    assert net.alone(reach, cell) > 0
-    for gates in (slice(0, 1), slice(1, 3), slice(3, 5)):  # of distance, colour and medium
-        bias = cell.bias.copy()
-        bias[gates] -= 1e9
-        assert net.alone(reach, cell._replace(bias=bias)) == 0
-    assert net.alone(1e9 * reach, cell) == 0
 
 
 @pytest.mark.parametrize(("radius", "away", "power"), [(0.5, 3.0, 40.0), (1.4, 3.0, 1500.0)])
@@ -289,7 +258,7 @@ def test_what_is_cut_out_of_a_medium_is_not_in_it() -> None:
         origin = np.array(eye, np.float32)
         way = np.random.default_rng(1).normal(0, 0.4, (3, 400)).astype(np.float32) - origin[:, None]
         way /= np.linalg.norm(way, axis=0)
-        trail = march(solids, origin, way, np.full(400, 9.0, np.float32))
+        trail = solids.march(origin, way, np.full(400, 9.0, np.float32), gap=0.009)
         t = np.linspace(0, 7, 7001)
         inside = _within(origin, way, (0, 0, 0), 1.0, t)
         for centre, radius in cuts:
@@ -311,14 +280,6 @@ TORUS = 0.7, 0.3  # radii of its circle and of its tube
 LAMP = np.array([1.5, 2.6, 1.8], np.float32)
 PLACE = (scaled(0.6, 0.5, 0.8), turned(0.7), moved(0.2, 0.1, -0.1))
 MIST = Object("torus", PLACE, "volumetric", (0.9, 0.5, 0.2))
-BETWEEN = (scaled(0.5), moved(*(0.6 * LAMP).tolist()))  # the light and the mist
-FAR = Object("sphere", (scaled(0.3, 0.4, 0.3), moved(-1.1, -0.3, 0.9)), "volumetric", (0.2, 0.5, 0.9))
-
-
-def marching() -> SolidArrays:
-    """The shipped network without its answers, as files of before had it."""
-    config = replace(network().config, segment=0, answered=0)
-    return SolidArrays(config, {k: v for k, v in weights().items() if not k.startswith("segment")})
 
 
 def rays(count: int) -> tuple[np.ndarray, np.ndarray]:
@@ -334,7 +295,7 @@ def lengths(solids: SolidField) -> np.ndarray:
     way, limit = (solids.xp.array(a, solids.network.codes) for a in rays(2000))
     with solids.xp.inference():
         lamp = solids.xp.array(LAMP, solids.network.codes)
-        return np.asarray(march(solids, lamp, way, limit, whole=True).depth) / EXTINCTION
+        return np.asarray(solids.march(lamp, way, limit, gap=0.009, whole=True).depth) / EXTINCTION
 
 
 @pytest.mark.parametrize(("leaf", "near", "far"), [("sphere", 0.006, 0.025), ("torus", 0.015, 0.06)])
@@ -357,48 +318,6 @@ def test_lengths_are_those_of_closed_forms(leaf: str, near: float, far: float) -
     assert np.quantile(wrong, 0.99) < far
 
 
-def more(*steps: Step) -> list[Object]:
-    return [MIST._replace(steps=(*steps, *PLACE))]
-
-
-@pytest.mark.parametrize(
-    "objects",
-    [
-        more(Twist(0.5)),
-        more(Displace(0.05, 5.0)),
-        [MIST._replace(steps=(turned(1.5), scaled(3.0), *BETWEEN))],  # the light is in its ball
-        [MIST, Object("sphere", BETWEEN, "volumetric", token="subtract")],
-        [MIST, Object("torus", (scaled(2.0), *BETWEEN))],
-        [MIST, Object("sphere", (scaled(1.2),), "volumetric", token="intersect")],
-        [MIST, MIST._replace(token="smooth")],
-        [MIST, Object("sphere", (scaled(1.1),), "volumetric")],
-        [Object("torus", (scaled(1.5),)), MIST],
-    ],
-)
-def test_where_they_do_not_hold_rays_are_marched(objects: list[Object]) -> None:
-    touched = lengths(field([MIST])) > 0  # others may pass one ball alone
-    asked, marched = lengths(field(objects))[touched], lengths(field(objects, marching()))[touched]
-    assert (marched > 0).sum() > 300
-    off = abs(asked - marched)  # batches round differently, and rays are followed from other places
-    assert np.percentile(off, 99) < 2e-4
-    assert off.max() < 3e-3
-
-
-def test_random_weights_draw_other_light_and_none_march() -> None:
-    wrong = SolidArrays(network().config, weights())
-    wrong.segment_w = [
-        np.random.default_rng(1).normal(size=w.shape).astype(np.float32) for w in wrong.segment_w
-    ]
-    stage = Stage(lights=(Light(tuple(LAMP.tolist())),))
-    mine, noise, none, theirs = (
-        draw_solids(field([MIST, FAR], net), stage, (64, 64))[0]
-        for net in (network(), wrong, marching(), torch_network())
-    )
-    assert psnr_db(mine, noise) < 40
-    assert 50 < psnr_db(mine, none) < 90
-    assert psnr_db(mine, theirs) > 80
-
-
 def test_weights_of_before_draw_as_they_did() -> None:
     """Layers of SiLU units, which knew two leaves by codes that these still have."""
     digest = "bab13c03f05d30652d0d0c58a7508ae7072d798f881b7a17902d7f66f6384f0a"
@@ -411,7 +330,7 @@ def test_weights_of_before_draw_as_they_did() -> None:
         exact = leaf_distance(leaf, q)
         near = abs(exact) < 0.05
         assert abs(old.field(q, old.decoder(code), False)[0] - exact)[near].max() < 3e-3
-    off = abs(lengths(field([MIST], old)) - lengths(field([MIST])))  # each answers for segments by itself
+    off = abs(lengths(field([MIST], old)) - lengths(field([MIST])))
     assert off.mean() < 0.01
     assert off.max() < 0.1
 
@@ -431,13 +350,7 @@ def test_the_field_has_the_colours_of_the_reference(library: str, element) -> No
     solids = field(objects, torch_network() if library == "torch" else None)
     p = np.random.default_rng(2).uniform(-1, 1, (3, 4000)).astype(np.float32)
     exact = ExactField(graph(objects)).at(p.astype(float))
-    like = solids.xp.array(p, solids.network.codes)
-    with solids.xp.inference():
-        if library == "numpy":
-            found = everywhere(solids, like).register[:3]
-        else:  # one object alone
-            found = solids.xp.to_numpy(solids.worn(solids.xp.whole(like[0] * 0), like))
-            exact = ExactField(graph(objects[:1])).at(p.astype(float))
+    found = solids.xp.to_numpy(everywhere(solids, p).register[:3])
     inside = exact.d < -0.02
     assert inside.sum() > 100
     error = abs(found - exact.rgb)[:, inside]

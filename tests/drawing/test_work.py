@@ -13,17 +13,14 @@ from scenelang.compiler.program import Program
 from scenelang.drawing import work
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import enlarged
+from scenelang.drawing.kernel import Kernel
 from scenelang.drawing.neural import draw
-from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.solid import around
-from scenelang.drawing.solid import draw as solid
-from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.work import allowed_s, load_of, work_ms
 
 BALL = "sphere { scale(0.5); }"
 SKY = "sky(); " + BALL
-MIST = "for (i in 1..16) { sphere { shell(0.02); scale(0.05 * i); material volumetric; } }"
 
 
 def program(text: str, side: int = 24) -> Program:
@@ -38,28 +35,23 @@ def discs(count: int) -> str:
 def counted(drawn: Program, monkeypatch: pytest.MonkeyPatch) -> float:
     """How often the network is asked while a picture is drawn, and some of that for each ray."""
     count = 0.0
-    meet, decoded, passes = SolidField.meet, SolidField.decoded, SolidField.passes
+    field, rays = Kernel.field, Kernel.rays
 
-    def met(self: SolidField, *given: Any, **named: Any) -> Any:
+    def met(self: Kernel, *given: Any, **named: Any) -> Any:
         nonlocal count
-        result = meet(self, *given, **named)
+        result = field(self, *given, **named)
         count += result.met
         return result
 
-    def alone(self: SolidField, at: np.ndarray, bounds: Any) -> Any:
+    def followed(self: Kernel, *given: Any, **named: Any) -> Any:
         nonlocal count
-        count += at.shape[1]
-        return decoded(self, at, bounds)
-
-    def passed(self: SolidField, origin: Any, way: np.ndarray, *given: Any) -> Any:
-        nonlocal count
-        count += around.EACH_RAY * way.shape[1]
-        return passes(self, origin, way, *given)
+        result = rays(self, *given, **named)
+        count += result.met + around.EACH_RAY * len(result.hit)
+        return result
 
     with monkeypatch.context() as patch:
-        patch.setattr(SolidField, "meet", met)
-        patch.setattr(SolidField, "decoded", alone)
-        patch.setattr(SolidField, "passes", passed)
+        patch.setattr(Kernel, "field", met)
+        patch.setattr(Kernel, "rays", followed)
         draw_small(drawn, patient=True)
     return count
 
@@ -158,18 +150,3 @@ def test_the_time_allowed_grows_with_the_pixels() -> None:
     assert seconds == sorted(seconds)
     assert seconds[0] < 60
     assert seconds[2] == 300
-
-
-def test_no_picture_keeps_too_much_at_once(monkeypatch: pytest.MonkeyPatch) -> None:
-    """The more balls rays pass, and in media for each other, the fewer rays at a time; the picture stays."""
-    lone, walls = (
-        solid.Lighting(
-            SolidField(load_arrays(p.model, p.weights).network, p.vectors, p.tokens), p.stage
-        ).most((256, 256))  # type: ignore[arg-type]
-        for p in (program(BALL), program(MIST))
-    )
-    assert solid.SLOTS // (16 * 49) <= walls < lone == solid.TILE
-    drawn = program(MIST.replace("16", "3"), 12)
-    whole = nsg.render(drawn)
-    monkeypatch.setattr(solid, "SLOTS", 1 << 8)
-    assert abs(nsg.render(drawn) - whole).max() < 1 / 255

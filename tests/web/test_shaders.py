@@ -28,7 +28,7 @@ from scenelang.drawing.neural.meetings import Pairs, meetings_of
 from scenelang.drawing.neural.network import RADIUS
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.network import EMPTY, SolidArrays, Wanted
+from scenelang.drawing.solid.network import EMPTY, SolidArrays
 from scenelang.web.arrays import ArrayStore, script, shapes_of
 from scenelang.web.export import has_sky, view_of
 from scenelang.web.plane import leaves
@@ -506,18 +506,8 @@ def solids() -> SolidArrays:
 def field_at(program: Program, points: np.ndarray) -> np.ndarray:
     """Distance, colour and medium (M, 5) at points (M, 3), as numpy has them."""
     field = SolidField(solids(), program.vectors, program.tokens, program.brought(), program.paints())
-    eye = np.array([0.3, 9.1, 7.7], np.float32)  # rays to the points come from anywhere
-    way = (points - eye).T
-    t = np.sqrt((way**2).sum(0))
-    way = (way / t).astype(np.float32)
-    found = np.tile(np.array([100.0, 0, 0, 0, 0]), (len(points), 1))
-    some, passes = field.passes(eye, way, t + 1, tight=False)
-    meeting = field.meet(
-        passes, t[some].astype(np.float32), Wanted.ALL, p=np.ascontiguousarray(points.T[:, some])
-    )
-    found[some, 0] = meeting.distance
-    found[some, 1:4], found[some, 4] = meeting.register[:3].T, meeting.register[-1]
-    return found
+    found = field.near(points.T, 0.0, every=True)
+    return np.concatenate([found.distance[None], found.register[:3], found.register[-1:]]).T
 
 
 @pytest.mark.browser

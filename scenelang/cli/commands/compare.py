@@ -37,9 +37,8 @@ def command(ctx: click.Context, scene: str, out: str | None, request: options.Re
         ctx.exit(1)
     from scenelang.drawing.metrics import compare, over_white, side_by_side
     from scenelang.drawing.render import draw, draw_exact
-    from scenelang.drawing.torch_backend import choose_device
 
-    picture = over_white(draw(job.program, how, place=choose_device(how.device)).image)
+    picture = over_white(draw(job.program, how).image)
     with Bar() as bar:
         progress = partial(bar, "drawing the exact picture", total=1)
         exact = over_white(draw_exact(job.scene, spans=job.spans, progress=progress))

@@ -25,9 +25,9 @@ from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.meetings import LEVELS
 from scenelang.drawing.neural.network import FramedNetwork
 from scenelang.drawing.solid.draw import draw_solids, solid_outputs
-from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
+from scenelang.drawing.solid.plain import solid_field
 from scenelang.drawing.work import Plan, allowed_s, plan_of
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
@@ -152,7 +152,7 @@ def _drawn(
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
     brought, paints = program.brought(), program.paints()
-    field = SolidField(network, program.vectors, program.tokens, brought, paints)  # type: ignore[arg-type]
+    field = solid_field(network, program.vectors, program.tokens, brought, paints)  # type: ignore[arg-type]
     image, work = draw_solids(
         field,
         replace(program.stage, sky=None) if even else program.stage,
@@ -239,7 +239,7 @@ def program_outputs(
 
 def _outputs(network: FramedNetwork | SolidNetwork, program: Program, threads: int) -> Outputs:
     if program.stage is not None:
-        solids = SolidField(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
+        solids = solid_field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
     else:
         image = draw(network, replace(program, background=None)).image  # type: ignore[arg-type]

@@ -24,7 +24,7 @@ from scenelang.drawing.arrays import NUMPY, Array, Arrays
 from scenelang.drawing.solid.centres import UNKNOWN
 from scenelang.drawing.solid.emitters import Emitters
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.march import INF
 from scenelang.drawing.solid.mist import Mist
 from scenelang.drawing.solid.nodes import (
     ALL,
@@ -35,21 +35,17 @@ from scenelang.drawing.solid.nodes import (
     SIDES,
     Nodes,
     ground_places,
-    hollow,
     on_ground,
     on_objects,
     sphere,
     spread,
     turned,
 )
-from scenelang.drawing.solid.passes import INF
 
 RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
 # light by which nodes around a place differ, and world units from a place, for which that sends so many rays
 DIFFER, SHORT, AGAIN = 0.3, 1.2, 5
 GAP = 0.01  # world units, as of `MarchSettings`
-# part of rays that are given up, or number, but where they may leave what is closed; at most, or of nodes'
-RARE, LAST, OFTEN = 5e-3, 16, 0.06
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
 EXACT = 1e-3  # the part of the light that bounces leave out at most
@@ -188,7 +184,7 @@ class Around:
         self.seen: Any = None  # a `Seen`, once a picture is looked at
         self.mist = Mist(field, stage) if field.media else None
         with xp.inference():
-            for self.hollow in (hollow(field), True):  # again where walls turn out to be around many nodes
+            for self.hollow in (field.hollow, True):  # again where walls turn out to be around many nodes
                 self._place()
                 if self.hollow or self.closed < CLOSED:
                     break
@@ -205,7 +201,7 @@ class Around:
         self.lookup: Any = Lookup(xp, own) if self.first else None
         self.nodes = Nodes(*(xp.concat([a, b], -1) for a, b in zip(own, floor, strict=True)))
         self.count = self.nodes.p.shape[1]
-        self.few, self.finer = 0.0 if self.hollow else RARE, self.hollow and not self.emitters.there
+        self.finer = self.hollow and not self.emitters.there
         if self.hollow and self.lookup is not None:
             index = self.lookup.index
             first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
@@ -291,7 +287,7 @@ class Around:
         limit = to_ground(xp, self.stage.ground, p[1], way)
         bands = [slice(at, at + BATCH) for at in range(0, max(1, len(limit)), BATCH)]
         hits = [
-            march(self.field, p[:, band], way[:, band], limit[band], 0, GAP, True, few=self.few and OFTEN).hit
+            self.field.march(p[:, band], way[:, band], limit[band], halvings=0, gap=GAP, whole=True).hit
             for band in bands
         ]
         hit, through = xp.concat(hits, 0), share
@@ -355,7 +351,7 @@ class Around:
         p = p + lift * n
         to = other + lift * up - p
         far = xp.length(list(to)).clip(1e-6)
-        return 1.0 * (march(self.field, p, to / far, far, 0, GAP, True).hit == INF)
+        return 1.0 * (self.field.march(p, to / far, far, halvings=0, gap=GAP, whole=True).hit == INF)
 
     def _on_floor(self, at: Array) -> tuple[Array, ...]:
         """Nodes (4, K) around points on the ground, their shares, what is kept in the fade, and normals."""
@@ -455,9 +451,8 @@ class Around:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
         ``finer``, places nearer than nodes may be, and in hollows those where nodes differ, send rays.
         """
-        xp, few = self.xp, self.few and max(self.few if finer else OFTEN, min(OFTEN, LAST / (1 + p.shape[1])))
-        limit = to_ground(xp, self.stage.ground, p[1], way)
-        hit = march(self.field, p, way, limit, 0, GAP, few=few).hit
+        xp, limit = self.xp, to_ground(self.xp, self.stage.ground, p[1], way)
+        hit = self.field.march(p, way, limit, halvings=0, gap=GAP, whole=True).hit
         light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()
         for some, at, index, shares, kept, n in self._ends(p, way, hit, limit):
             sent = self._mixed(self.sent, index, shares)
@@ -563,7 +558,7 @@ class Around:
 
 def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples: int) -> float:
     """About how often the network is asked for what arrives from everywhere: rays, each as probes ask."""
-    xp, count, walls = field.xp, len(field.solids), hollow(field)
+    xp, count, walls = field.xp, len(field), field.hollow
     opaque = bool((np.asarray(xp.to_numpy(field.looks))[-1] < 0.5).any())
     floor = 0.0 if stage.ground is None else SIDES[walls] ** 2 / 4  # from which many rays meet nothing
     if not count:
@@ -577,14 +572,13 @@ def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples
     # from balls around objects to places in those of others
     u, v, r, turn = spread(np.arange(PROBES))
     own, other = np.arange(PROBES) * 7919 % count, (np.arange(PROBES) * 104729 + count // 2) % count
-    centre = np.array([np.asarray(xp.to_numpy(solid.centre)) for solid in field.solids]).T
-    extent = np.array([solid.extent for solid in field.solids])
+    centre, extent = field.objects.rows["centre"].T, field.objects.rows["extent"]
     p = centre[:, own] + extent[own] * sphere(u, v)
     way = centre[:, other] + r**0.5 * extent[other] * sphere(turn, u) - p
     way /= np.linalg.norm(way, axis=0).clip(1e-9)
     p, way = (xp.array(part.astype(np.float32), field.network.codes) for part in (p, way))
     with xp.inference():
-        met = march(field, p, way, to_ground(xp, None, 0.0, way), 0, GAP, few=OFTEN).work.met
+        met = field.march(p, way, to_ground(xp, None, 0.0, way), halvings=0, gap=GAP, whole=True).work.met
     number *= 1.0 if opaque else ASIDE_RAYS * (floor > 0)
     return number * (met / PROBES + EACH_RAY) + MIST * field.media
 

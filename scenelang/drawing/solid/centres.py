@@ -13,7 +13,7 @@ from collections.abc import Callable
 from typing import Any
 
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.solid.passes import INF
+from scenelang.drawing.solid.march import INF
 
 EACH, LARGE = (2, 3), 160  # pixels, along both sides, from one that asks to the next; and in large pictures
 # differences of shares: from one that asks to the next, and to a pixel's neighbours, whose samples take from

@@ -17,26 +17,15 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.solid.around import CAP, ELSEWHERE, LAST, OFF, RARE, arriving, to_ground
+from scenelang.drawing.kernel import Asked
+from scenelang.drawing.solid.around import CAP, ELSEWHERE, OFF, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, LARGE, Centres
-from scenelang.drawing.solid.field import Meeting, SolidField
+from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
-from scenelang.drawing.solid.march import (
-    CAREFUL,
-    MARCH_SETTINGS,
-    STEPS,
-    MarchSettings,
-    Piece,
-    Trail,
-    Work,
-    march,
-    parted,
-)
+from scenelang.drawing.solid.march import CAREFUL, INF, MARCH_SETTINGS, MarchSettings, Pieces, Trail, Work
 from scenelang.drawing.solid.mist import ALBEDO
-from scenelang.drawing.solid.network import Wanted
-from scenelang.drawing.solid.nodes import hollow
-from scenelang.drawing.solid.passes import INF, Passes
-from scenelang.drawing.solid.soft import ASIDE, BEAMS, MORE_BEAMS, WIDE, form, shown
+from scenelang.drawing.solid.soft import ASIDE, BEAMS, MORE_BEAMS, WIDE, form
+from scenelang.drawing.tables import stage_rows
 
 INTO = 3e-5  # world units behind a surface where its material is asked for
 UNEVEN = 0.3  # difference of beams of a lamp through media for which more are asked
@@ -46,13 +35,11 @@ FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
 PIXELS = 4096  # on surfaces, likewise
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
-TILE, SLOTS = 1 << 16, 1 << 23  # samples at a time, and slots of their rays, or of points on these in media
-ACROSS = 8  # rays along each side of a picture, that tell how many those are
+TILE, SIDE = 1 << 16, 8  # samples at a time; pixels of tiles whose samples follow each other
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
 CLEAR = 2e-4  # world units before a surface where rays from the light end
 THIRDS = 3  # of pieces of which nodes do not tell enough
 LEAST = 0.04  # of what is seen, that a piece has to have a part of to be cut
-HASTY = 50  # steps of rays from the light, where rays from the eye were lost already
 LONG = 2.0  # world units: longer pieces are cut
 SMALL = 0.15  # world units: lamps with shadows that may be sharper than pixels
 SMALLISH = 12.0  # pixels: median radius of objects below which samples share no light
@@ -116,7 +103,6 @@ class Lighting:
         def placed(value: object) -> Array:
             return field.xp.array(np.asarray(value, np.float32), like)
 
-        self.few = 0.0 if hollow(field) else RARE
         self.eye, self._four = placed(stage.camera.eye), placed(np.transpose(four)[:, :, None])
         self.horizon, self.zenith = placed(stage.horizon * twice), placed(stage.zenith * twice)
         mirrors = field.rough and stage.sky is not None
@@ -125,6 +111,10 @@ class Lighting:
         reach = max([light.radius for light in stage.lights], default=0.0)
         self.opaque = field.opaque((ASIDE + WIDE) * reach) if reach else field
         self.hazy = field.hazy() if reach else field
+        # what the kernel shades by, where all light is direct, from points, and colours are plain
+        self.rows: Any = None
+        if field.shades and stage.sky is None and not reach:
+            self.rows = stage_rows(stage, self.pace.gap, field.glowing)
         self.lamps = [
             Lamp(light, placed(light.position), placed([light.power * c for c in light.rgb] * twice))
             for light in stage.lights
@@ -141,33 +131,32 @@ class Lighting:
         alpha = 0 * way[0] + (0.0 if stage.transparent else 1.0)
         if stage.transparent:
             seen = seen * 0
-        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap)
+        trail = self.field.march(self.eye, way, limit, gap=self.pace.gap)
         surface, both, met = self._met(way, trail, limit, px)
         beside = None if centres is None else (centres, both)
         work = trail.work + Work(rays=way.shape[1], met=len(surface))
-        result, mist = [self._reflecting(met, beside)] if met else [], None
-        if trail.pieces:
-            pieces = trail.pieces[0] if self.field.sigma is None else parted(self.field, trail, True)
+        result, mist, pieces = [self._reflecting(met, beside)] if met else [], None, trail.pieces
+        if len(pieces.ray):
             for lamp in self.lamps:
                 pieces = self._cut(way, pieces, lamp)
-            mist, share = self._scattering(way, trail, pieces, px)
+            mist, share = self._scattering(way, pieces, px)
             result.append(mist)
         if not result:
             return Shade(seen[:3], seen[-3:], alpha, work)
         points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
-        light, free, more = self._lit(points, xp.take(trail.soft, surface), trail, beside=beside)
+        light, free, more = self._lit(points, xp.take(trail.soft, surface), beside=beside)
         work += more
         xp.put(seen, both, light[:, : len(both)])
         xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
         if mist is not None:
             lit = light[:, len(both) :], free[len(both) :]
-            glow, more = self._glow(way, trail, pieces, share, *lit, px)
+            glow, more = self._glow(way, pieces, share, *lit, px)
             clear = xp.exp(-trail.depth)
             seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
         return Shade(seen[:3], seen[-3:], alpha, work)
 
     def _glow(
-        self, way: Array, trail: Trail, pieces: Piece, share: Array, light: Array, free: Array, px: float
+        self, way: Array, pieces: Pieces, share: Array, light: Array, free: Array, px: float
     ) -> tuple[Array, Work]:
         """Light (R, M) that pieces of rays in media send towards the eye, by their shares (P,) of what is
         seen, and what nodes on them send (R, K), as the lamps of ``free`` (K,) reach them.
@@ -179,9 +168,9 @@ class Lighting:
         sent, nodes = light.reshape(len(light), count, -1), free.reshape(count, -1)
         shown = sent[-3:].sum(0)
         edge = (nodes != nodes[:1]).sum(0) > 0
-        cut = (edge | (shown[-1] > STEEP * shown[0]) | (pieces[2] - pieces[1] > LONG)) & (share > LEAST)
+        cut = (edge | (shown[-1] > STEEP * shown[0]) | (pieces.end - pieces.begin > LONG)) & (share > LEAST)
         whole, parts = xp.where(~cut), xp.where(cut)
-        xp.add(glow, xp.take(pieces[0], whole), xp.take(sent.sum(1), whole))
+        xp.add(glow, xp.take(pieces.ray, whole), xp.take(sent.sum(1), whole))
         if len(parts):
             ray, begin, end, before, sigma = (xp.take(part, parts) for part in pieces)
             each = (end - begin) / THIRDS
@@ -189,19 +178,18 @@ class Lighting:
                 (ray, begin + i * each, begin + (i + 1) * each, before + i * each, sigma)
                 for i in range(THIRDS)
             ]
-            pieces = tuple(xp.concat(part, 0) for part in zip(*finer, strict=True))
-            light, _, more = self._lit(self._scattering(way, trail, pieces, px)[0], trail.soft[:0], trail)
+            pieces = Pieces(*(xp.concat(list(part), 0) for part in zip(*finer, strict=True)))
+            light, _, more = self._lit(self._scattering(way, pieces, px)[0], way[0, :0])
             work += more + Work(met=light.shape[1])
-            xp.add(glow, pieces[0], light.reshape(len(light), count, -1).sum(1))
+            xp.add(glow, pieces.ray, light.reshape(len(light), count, -1).sum(1))
         return glow, work
 
     def received(self, p: Array, n: Array) -> Array:
         """What points on surfaces (3, K) with unit normals receive from lamps (3, K) whose middles they see;
         bounces blur the shadows.
         """
-        none = march(self.field, self.eye, p[:, :0], p[0, :0])
         points = Points(p, n, self._twice(0 * p), self._twice(0 * p + 1))
-        return self._lit(points, p[0, :0], none, False)[0][:3]
+        return self._lit(points, p[0, :0], False)[0][:3]
 
     def places(self, canvas: tuple[int, int], x: np.ndarray, y: np.ndarray) -> tuple[Array, Array]:
         """Points of surfaces and ground, and their normals (3, K), at places of the picture in pixels; points
@@ -210,7 +198,7 @@ class Lighting:
         xp = self.xp
         way = xp.array(directions(self.stage.camera, canvas, x, y).reshape(3, -1), self.eye)
         limit = self.limit(way)
-        trail = march(self.field, self.eye, way, limit, gap=self.pace.gap, whole=True, few=2 * self.few)
+        trail = self.field.march(self.eye, way, limit, gap=self.pace.gap, whole=True)
         p, n = 0 * way + ELSEWHERE, 0 * way
         _, both, met = self._met(way, trail, limit)
         for part, values in zip((p, n), met, strict=False):
@@ -219,19 +207,10 @@ class Lighting:
 
     def size(self, canvas: tuple[int, int]) -> float:
         """The median radius of objects as the eye sees them, in pixels."""
-        solids, length = self.field.solids, self.xp.length
-        seen = [s.extent / max(float(length(list(s.centre - self.eye))), 1e-6) for s in solids]
-        return float(np.median(seen or [0.0]) * min(canvas) / 2 / np.tan(self.stage.camera.fov_rad / 2))
-
-    def most(self, canvas: tuple[int, int]) -> int:
-        """Samples at a time, fewer where rays pass many balls, each of which is kept for each of the others
-        in media.
-        """
-        x, y = ((np.arange(ACROSS) + 0.5) * (side / ACROSS) for side in canvas)
-        way = directions(self.stage.camera, canvas, x, y[:, None]).reshape(3, -1)
-        way = self.xp.array(way, self.eye)
-        balls: int = self.field.passes(self.eye, way, self.limit(way))[1].slots.shape[1]
-        return min(TILE, SLOTS // max(1, balls * (1 + self.pace.nodes * balls * self.field.media)))
+        rows = self.field.objects.rows
+        away = np.linalg.norm(rows["centre"] - np.asarray(self.stage.camera.eye), axis=1)
+        seen = rows["extent"] / away.clip(1e-6) if len(rows) else [0.0]
+        return float(np.median(seen) * min(canvas) / 2 / np.tan(self.stage.camera.fov_rad / 2))
 
     def limit(self, way: Array) -> Array:
         """Distances (M,) to the ground along rays from the eye, inf for rays that never meet it."""
@@ -274,7 +253,7 @@ class Lighting:
         """Light (R, K) on colours and plain colours, of (3, K)."""
         return light if len(self.horizon) == 3 else self.xp.concat([light, light], 0)
 
-    def _scattering(self, way: Array, trail: Trail, pieces: Piece, px: float) -> tuple[Points, Array]:
+    def _scattering(self, way: Array, pieces: Pieces, px: float) -> tuple[Points, Array]:
         """Nodes in media, whose light comes towards the eye, all pieces for each in turn, and shares (P,).
 
         With u = 1 - T^(1 / EVEN), the integral over T sigma dt is one over EVEN (1 - u)^(EVEN - 1) du. Where
@@ -292,9 +271,9 @@ class Lighting:
         weight = weights * (EVEN * taken * left ** (EVEN - 1) * xp.exp(-sigma * before))
         rays = xp.concat([ray] * self.pace.nodes, 0)
         p = self.eye[:, None] + xp.take(way, rays) * t
-        register = self.field.meet(trail.at(xp, rays), t, Wanted.ALL).register
+        register = self.field.near(p, self.pace.gap, every=True).register
         colour = register[: self.field.hues] * weight.reshape(-1)
-        for index, node, woven in self._textured(way, trail, pieces, px):
+        for index, node, woven in self._textured(way, pieces, px):
             xp.put(colour[:3], index + node * len(ray), woven)
         if self.around is not None:
             colour = xp.minimum(colour, ALBEDO * weight.reshape(-1))
@@ -305,11 +284,11 @@ class Lighting:
         return Points(p, way[:, :0], base, colour, self._bare * p[:1, :0]), weight.sum(0)
 
     def _lit(
-        self, points: Points, soft: Array, seen: Trail, wide: bool = True, beside: Beside = None
+        self, points: Points, soft: Array, wide: bool = True, beside: Beside = None
     ) -> tuple[Array, Array, Work]:
         """Light (R, K) from points, a number (K,) that tells by which lamps they are reached, and what it
-        took. Of the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there;
-        ``seen`` is the eye's trail. Unless ``wide``, what hides a lamp's middle hides all of it.
+        took. Of the first, ``soft`` is 1 where they are not at a distance of 0 though something begins there.
+        Unless ``wide``, what hides a lamp's middle hides all of it.
         With ``beside`` points on surfaces are those that rays (F,) met.
         """
         xp, p, light, work = self.xp, points.p, points.base, Work()
@@ -324,7 +303,7 @@ class Lighting:
             if lamp.light.radius and wide:
                 clear, took = self._softly(number, lit, off, normals, beside)
             else:
-                clear, took = self._reached(lamp, xp.take(off, lit), xp.take(edge, lit) > 0, seen, wide)
+                clear, took = self._reached(lamp, xp.take(off, lit), xp.take(edge, lit) > 0)
             xp.put(light, lit, xp.take(light, lit) + xp.take(more, lit) * clear)
             xp.put(free, lit, xp.take(free, lit) + (clear > 0) * 2.0**number)
             work += took
@@ -372,7 +351,7 @@ class Lighting:
     def _shared(self, lamp: Lamp, p: Array, n: Array) -> tuple[Array, Work]:
         """As `_reached`, of a lamp of a radius; n (3, K) are normals, 0 in media."""
         xp, radius = self.xp, lamp.light.radius
-        part, work = shown(self.opaque, lamp.at, radius, p, n)
+        part, work = self.opaque.shown(lamp.at, radius, p, n)
         some = xp.where(part > 0)
         if self.field.media and len(some):
             clear, took = self._hazed(lamp, xp.take(p, some), xp.take(n, some))
@@ -405,24 +384,24 @@ class Lighting:
         r = xp.length(way)
         way, along = way / r, _dot(start, way) / r
         rim = xp.sqrt(along * along + (radius * radius - _dot(start, start))) - along  # of the lamp
-        trail = march(self.hazy, start + lamp.at[:, None], way, r - CLEAR, 0, self.pace.gap, True, start=rim)
+        origin, gap = start + lamp.at[:, None], self.pace.gap
+        trail = self.hazy.march(origin, way, r - CLEAR, start=rim, gap=gap, halvings=0, whole=True)
         return xp.exp(-trail.depth).reshape(len(beams), -1), trail.work
 
-    def _reached(self, lamp: Lamp, p: Array, edge: Array, seen: Trail, exact: bool) -> tuple[Array, Work]:
+    def _reached(self, lamp: Lamp, p: Array, edge: Array) -> tuple[Array, Work]:
         """Parts of a lamp's light (K,) that arrive at points (3, K), and what it took; of ``edge`` as `_lit`
-        of ``soft``. Few rays are given up unless it is to be ``exact``.
+        of ``soft``.
         """
         xp, way = self.xp, p - lamp.at[:, None]
         r = xp.length(way)
-        limit, steps = xp.select(edge, r, r - CLEAR), HASTY if seen.work.lost else STEPS
-        ways, begin = way / r.clip(1e-9), lamp.light.radius
-        few = 0.0 if exact else self.few and max(3 * self.few, LAST / (10 * LAST + len(r)))
-        trail = march(self.field, lamp.at, ways, limit, 0, self.pace.gap, True, steps, begin, few)
+        limit, ways, gap = xp.select(edge, r, r - CLEAR), way / r.clip(1e-9), self.pace.gap
+        start = lamp.light.radius
+        trail = self.field.march(lamp.at, ways, limit, start=start, gap=gap, halvings=0, whole=True)
         clear = (trail.hit == INF) * xp.exp(-trail.depth)
-        inside = xp.where(edge & (clear > 0) & (trail.place >= 0))
+        inside = xp.where(edge & (clear > 0))
         if len(inside):  # rays may have ended before they met what is opaque there
-            at = self.field.meet(trail.at(xp, inside), xp.take(r, inside), Wanted.KIND)
-            opaque = (at.distance < 0) & (at.register[0] < 0.5)
+            at = self.field.near(xp.take(p, inside), gap, every=True)
+            opaque = (at.distance < 0) & (at.register[-1] < 0.5)
             xp.put(clear, inside, xp.take(clear, inside) * ~opaque)
         return clear, trail.work + Work(lights=len(r))
 
@@ -430,8 +409,7 @@ class Lighting:
         """Points where rays meet solids, normals (3, K), colours, light from before them (R, K), coats."""
         xp = self.xp
         t = xp.take(trail.hit, index)
-        passes = trail.at(self.xp, index)
-        result = self.field.meet(passes, t + INTO, Wanted.ALL, gradient=True)
+        result = self.field.near(origin + way * (t + INTO), self.pace.gap, every=True)
         sharp = xp.take(trail.soft, index) == 0
         left = _dot(result.gradient, way) > 0  # beyond an edge
         off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
@@ -439,12 +417,13 @@ class Lighting:
             left, ways = xp.take(left, off), xp.take(way, off)
             t_off = xp.take(t, off) + INTO
             t_off = t_off + xp.select(left, 0 * t_off - self.pace.gap, self._ahead(result, way, off))
-            again = self.field.meet(trail.at(xp, xp.take(index, off)), t_off, Wanted.ALL, gradient=True)
+            begin = origin if origin.shape[1] == 1 else xp.take(origin, off)
+            again = self.field.near(begin + ways * t_off, self.pace.gap, every=True)
             beyond = left & (_dot(again.gradient, ways) > 0)
             there = xp.where((_dot(again.gradient, again.gradient) > 0.01) & ~beyond)  # not past an edge
             off = xp.take(off, there)
             xp.put(t, off, xp.take(t_off, there) - INTO)
-            for name in ("distance", "register", "gradient"):
+            for name in ("distance", "register", "gradient", "owner"):
                 xp.put(getattr(result, name), off, xp.take(getattr(again, name), there))
         g = result.gradient
         towards = _dot(g, way)
@@ -454,25 +433,24 @@ class Lighting:
         colour = result.register[: self.field.hues]
         glow = self._twice(self.field.glow(result.register)) if self.field.glowing else 0 * colour
         for soft in (False, True) if px and self.field.textures else ():
-            some = xp.where((self.field.textured(passes) > 0) & (sharp != soft))
+            some = xp.where((self.field.texels(origin, way, t, t) > 0) & (sharp != soft))
             if len(some):
+                owners = xp.whole(xp.take(result.owner, some) - 1).clip(0)
                 ways, ts, ns = (xp.take(each, some) for each in (way, t, n))
-                mean = self._mean(passes.at(xp, some), ways, ts, ns, soft, px)
-                xp.put(colour[:3], some, mean)
+                xp.put(colour[:3], some, self._mean(owners, ways, ts, ns, soft, px))
         if self.around is not None:
             colour = colour.clip(None, CAP)
             some = xp.where(~sharp)
             if len(some):  # normals may be the medium's, and no light begins within what is opaque
-                off = xp.take(p + OFF * n, some)
-                met = self.field.meet(passes.at(xp, some), xp.take(t, some), Wanted.KIND, p=off)
-                inside = (met.distance < 0) & (met.register[0] < 0.5)
+                met = self.field.near(xp.take(p + OFF * n, some), self.pace.gap, every=True)
+                inside = (met.distance < 0) & (met.register[-1] < 0.5)
                 xp.put(colour, some, xp.take(colour, some) * ~inside)
         if not len(self._bare):
             return p, n, colour, glow, self._bare * p[:1]
         colour, coat = coated(xp, n, -way, colour, self.field.material(result).roughness)
         return p, n, colour, glow, coat
 
-    def _ahead(self, met: Meeting, way: Array, index: Array | None) -> Array:
+    def _ahead(self, met: Asked, way: Array, index: Array | None) -> Array:
         """Distance along rays from the points where the field was asked to the surface."""
         xp, d, g = self.xp, met.distance, met.gradient
         if index is not None:
@@ -496,13 +474,13 @@ class Lighting:
             colour = colour.clip(None, CAP)
         return p, n, kept * colour, (1 - kept) * horizon, self._bare * p[:1]
 
-    def _cut(self, way: Array, piece: Piece, lamp: Lamp) -> Piece:
+    def _cut(self, way: Array, piece: Pieces, lamp: Lamp) -> Pieces:
         """The same pieces of rays, cut where the light of a lamp falls unevenly along them."""
         xp, (ray, begin, end, before, sigma) = self.xp, piece
         ways, to = xp.take(way, ray), (lamp.at - self.eye)[:, None]
         first, last = to - ways * begin, to - ways * end
         narrow = _dot(first, last) > NARROW * xp.length(first) * xp.length(last)
-        result = [tuple(xp.take(part, xp.where(narrow)) for part in piece)]
+        result = [Pieces(*(xp.take(part, xp.where(narrow)) for part in piece))]
         wide = xp.where(~narrow)
         if not len(wide):
             return result[0]
@@ -512,55 +490,55 @@ class Lighting:
         for low, high in pairwise(CUTS):
             a, b = xp.maximum(begin, middle + low * aside), xp.minimum(end, middle + high * aside)
             some = xp.where(a < b)
-            result.append(tuple(xp.take(part, some) for part in (ray, a, b, before + a - begin, sigma)))
-        return tuple(xp.concat(list(parts), 0) for parts in zip(*result, strict=True))
+            parts = ray, a, b, before + a - begin, sigma
+            result.append(Pieces(*(xp.take(part, some) for part in parts)))
+        return Pieces(*(xp.concat(list(parts), 0) for parts in zip(*result, strict=True)))
 
-    def _mean(self, passes: Passes, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
-        """Mean colours (3, K) where the samples of pixels meet the planes through points at t with normals n;
-        what a medium gives way to, if soft, has its own plane and colours there.
+    def _mean(self, owners: Array, way: Array, t: Array, n: Array, soft: bool, px: float) -> Array:
+        """Mean colours (3, K) where the samples of pixels meet the planes through points at t, of objects by
+        their numbers, with normals n; what a medium gives way to, if soft, has its own plane and colours.
         """
         xp, field = self.xp, self.field
         if len(t) > PIXELS:
             parts = [slice(at, at + PIXELS) for at in range(0, len(t), PIXELS)]
-            some = [
-                (Passes(passes.slots[:, :, at], passes.origins), way[:, at], t[at], n[:, at]) for at in parts
-            ]
+            some = [(owners[at], way[:, at], t[at], n[:, at]) for at in parts]
             return xp.concat([self._mean(*each, soft, px) for each in some], 1)
-        seen, objects = way * t, None
+        seen = way * t
         if soft:
-            owner = field.meet(passes, t + INTO, Wanted.KIND, owners=True).owner
-            objects = xp.whole(owner - 1).clip(0)
-            n = field.normals(objects, self.eye[:, None] + seen)
-        off = self._four * (px * t * (self._forward @ way))
+            n = field.own(owners, self.eye[:, None] + seen)[1]
+        side = px * t * (self._forward @ way)
+        off = self._four * side
         towards = (n * seen).sum(0)
         towards = xp.select(abs(towards) > 1e-6, towards, 0 * t - 1e-6)  # of planes seen from the side
         ratio = ((n[:, None] * off).sum(0) / towards).clip(-GRAZING, GRAZING)
         off = (off - seen[:, None] * ratio) / (1 + ratio)
-        p = (self.eye[:, None] + way * (t + INTO))[:, None] + off
-        if objects is not None:
-            result = field.worn(xp.concat([objects] * 4, 0), p.reshape(3, -1))
-        else:
-            four = Passes(xp.concat([passes.slots] * 4, 2), passes.origins)
-            result = field.colours(four, xp.concat([t + INTO] * 4, 0), p.reshape(3, -1))
-        return result.reshape(3, 4, -1).mean(1)
+        p = ((self.eye[:, None] + way * (t + INTO))[:, None] + off).reshape(3, -1)
+        owners = xp.concat([owners] * 4, 0)
+        if soft:
+            return field.worn(owners, p).reshape(3, 4, -1).mean(1)
+        met = field.near(p, xp.concat([side] * 4, 0), every=True)
+        colours = met.register[:3]
+        beside = xp.where(met.owner == 0)  # the plane goes on beyond the surface
+        if len(beside):
+            xp.put(colours, beside, field.worn(xp.take(owners, beside), xp.take(p, beside)))
+        return colours.reshape(3, 4, -1).mean(1)
 
-    def _textured(
-        self, way: Array, trail: Trail, pieces: Piece, px: float
-    ) -> Iterator[tuple[Array, int, Array]]:
+    def _textured(self, way: Array, pieces: Pieces, px: float) -> Iterator[tuple[Array, int, Array]]:
         """Pieces of rays in media with textures: their indices, a node, and the result of `_woven` there."""
         xp, (ray, begin, end, _, sigma) = self.xp, pieces
         if not self.field.textures:
             return
-        texels = self.field.textured(trail.at(xp, ray)) * xp.minimum(end - begin, 1 / sigma)
+        texels = self.field.texels(self.eye[:, None], xp.take(way, ray), begin, end)
+        texels = texels * xp.minimum(end - begin, 1 / sigma)
         for some, panels in (((texels > 0) & (texels <= BUSY), FEW), (texels > BUSY, MANY)):
             whole = xp.where(some)
             for start in range(0, len(whole), CHUNK):
                 index = whole[start : start + CHUNK]
-                part = tuple(xp.take(each, index) for each in pieces)
-                for node, woven in enumerate(self._woven(way, trail, part, panels, px)):
+                part = Pieces(*(xp.take(each, index) for each in pieces))
+                for node, woven in enumerate(self._woven(way, part, panels, px)):
                     yield index, node, woven
 
-    def _woven(self, way: Array, trail: Trail, pieces: Piece, panels: int, px: float) -> list[Array]:
+    def _woven(self, way: Array, pieces: Pieces, panels: int, px: float) -> list[Array]:
         """The colours (3, P) that nodes on pieces of rays have, times their weights, where colours vary.
         Between nodes the light is a polynomial; it meets colours of many more points, in turn the samples'.
         """
@@ -578,12 +556,13 @@ class Lighting:
         weight = EVEN / count * taken * left ** (EVEN - 1) * xp.exp(-sigma * before)
         rays = xp.concat([ray] * count, 0)
         ways = xp.take(way, rays)
-        p = self.eye[:, None] + ways * t
+        p, side = self.eye[:, None] + ways * t, px * t * (self._forward @ ways)
         if px:
             turns = np.resize((0, 1, 2, 3, 3, 2, 1, 0), count)
             four = xp.stack([self._four[:, i] for i in turns.tolist()], 1)  # (3, places, 1)
-            p = p + (four * (px * t * (self._forward @ ways)).reshape(count, -1)).reshape(3, -1)
-        colours = self.field.colours(trail.at(xp, rays), t, p).reshape(3, count, -1) * weight
+            p = p + (four * side.reshape(count, -1)).reshape(3, -1)
+        met = self.field.near(p, self.pace.gap + side, every=True)
+        colours = met.register[:3].reshape(3, count, -1) * weight
         shares = [xp.array(base[:, None].astype(np.float32), way) for base in bases]
         return [(colours * share).sum(1) for share in shares]
 
@@ -615,7 +594,7 @@ def draw_solids(
         around.look(canvas, partial(lighting.places, canvas))
         tell(lit := 0.5)
     out = np.empty((4, height, width), np.float32)
-    rows = max(1, min(4 * lighting.most(canvas) // (count * width), -(-height // (split or threads))))
+    rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     costs: list[Work] = []
 
@@ -658,6 +637,8 @@ def _band(
         centres, picture, work = None, np.empty((4, len(rows), width), np.float32), Work()
         y, x = (a.reshape(-1) for a in np.mgrid[0 : len(rows), 0:width])
     if len(x):
+        tiles = np.argsort(y // SIDE * -(-width // SIDE) + x // SIDE, kind="stable")
+        x, y = x[tiles], y[tiles]  # near each other, the same objects are met
         across, down = sample_places(count)
         y_samples = y[:, None] + rows.start + down
         if centres is not None:
@@ -680,6 +661,9 @@ def _shade(
 ) -> tuple[np.ndarray, Work]:
     """Radiance, alpha and plain radiance (7, …) at places of the picture; the rest as of `Lighting.shade`."""
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
+    if lighting.rows is not None:
+        light, shaded = lighting.field.shade(lighting.rows, way)
+        return np.concatenate([light, light[:3]]), shaded
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px, centres)
         result = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))
@@ -738,7 +722,7 @@ def solid_outputs(
 def _alpha(lighting: Lighting, way: Array) -> tuple[Trail, Array]:
     """The trail of rays (3, M) from the eye, and the share of the background that objects hide (M,)."""
     with lighting.xp.inference():
-        trail = march(lighting.field, lighting.eye, way, lighting.limit(way))
+        trail = lighting.field.march(lighting.eye, way, lighting.limit(way), gap=CAREFUL.gap)
         return trail, 1 - (trail.hit == INF) * lighting.xp.exp(-trail.depth)
 
 
@@ -753,16 +737,17 @@ def _shown(lighting: Lighting, ways: np.ndarray) -> np.ndarray:
         out = xp.concat([depth[None], 0 * way, 0 * alpha[None], alpha[None]], 0)
         ground = xp.where(out[0] < INF)
         out[2, ground] = 1.0
-        for ray, begin, end, before, *_ in reversed(trail.pieces):
-            first = xp.where(before == 0)  # a ray's pieces come in order
+        ray, begin, end, before, _ = trail.pieces
+        first = xp.where(before == 0)
+        if len(first):
             ray, t = xp.take(ray, first), xp.take(xp.minimum((begin + end) / 2, begin + DEEP), first)
-            out[4, ray] = field.meet(trail.at(xp, ray), t, Wanted.KIND, owners=True).owner
+            p = lighting.eye[:, None] + xp.take(way, ray) * t
+            out[4, ray] = field.near(p, CAREFUL.gap, every=True).owner
         solid = xp.where(trail.hit < INF)
         if len(solid):
             to = xp.take(way, solid)
             p, n, *_ = lighting.surface(to, solid, trail, 0.0, lighting.eye[:, None])
             away = p - lighting.eye[:, None]
             out[0, solid], out[1:4, solid] = forward @ away, n
-            t = xp.length(list(away)) + INTO
-            out[4, solid] = field.meet(trail.at(xp, solid), t, Wanted.KIND, owners=True).owner
+            out[4, solid] = field.near(p + to * INTO, CAREFUL.gap, every=True).owner
     return np.asarray(xp.to_numpy(out)).reshape(ROWS, *ways.shape[1:])

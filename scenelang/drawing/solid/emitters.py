@@ -13,9 +13,8 @@ import numpy as np
 from scenelang.compiler.spaces import LIFT
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import march
+from scenelang.drawing.solid.march import INF
 from scenelang.drawing.solid.nodes import SCATTER, Nodes
-from scenelang.drawing.solid.passes import INF
 
 DISCS = 1024  # of all that glows
 RAYS, LEAST = 32, 4  # to some of these from each point, where it is bright, and at least
@@ -102,7 +101,7 @@ class Emitters:
         begin = xp.take(p if n is None else p + LIFT * n, point)
         way = xp.take(self.p, disc) - begin
         far = xp.sqrt((way * way).sum(0)).clip(1e-6)
-        trail = march(self.field, begin, way / far, far - CLEAR, 0, GAP, True)
+        trail = self.field.march(begin, way / far, far - CLEAR, halvings=0, gap=GAP, whole=True)
         share = xp.take(many, some) * xp.take(sums[:, -1] / passed[:, -1].clip(1.0), point)
         sent = xp.take(self.glow / bright, disc) * share
         return light, point, way / far, sent, (trail.hit == INF) * xp.exp(-trail.depth)

@@ -16,7 +16,6 @@ import numpy as np
 
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.around import GOLDEN, to_ground
-from scenelang.drawing.solid.march import march
 
 GLAZE = 0.04  # of light along the normal, that what is glossy reflects
 ROUGH, BACK, STRAIGHT = 0, slice(1, 4), slice(4, None)  # rows of coats
@@ -131,11 +130,11 @@ def arriving(lighting: Any, p: Array, way: Array, mirrors: int) -> Array:
     """The light (R, K) that comes to points (3, K) from unit directions, and is mirrored so often at most."""
     xp, around = lighting.xp, lighting.around
     light, limit = lighting._twice(around.sky(way)), to_ground(xp, lighting.stage.ground, p[1], way)
-    trail = march(lighting.field, p, way, limit, 0, STEP)
+    trail = lighting.field.march(p, way, limit, halvings=0, gap=STEP)
     _, both, met = lighting._met(way, trail, limit, origin=p)
     if met:
         points = lighting._reflecting(met, None, mirrors)
-        xp.put(light, both, lighting._lit(points, p[0, :0], trail)[0])
+        xp.put(light, both, lighting._lit(points, p[0, :0])[0])
     if around.mist is not None:
         mist = around.mist.along(p, way, xp.minimum(trail.hit, limit))[0]
         light = light * xp.exp(-trail.depth) + lighting._twice(mist)

@@ -25,9 +25,8 @@ import numpy.typing as npt
 from scenelang.compiler.spaces import Light, Sky, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.march import march
-from scenelang.drawing.solid.passes import INF
-from scenelang.drawing.tables import inverses
+from scenelang.drawing.solid.march import INF
+from scenelang.drawing.tables import BOXED, DRAWS, inverses
 
 Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
@@ -158,7 +157,7 @@ class Mist:
             way = xp.array(p, like) - at[:, None]
             r = xp.length(list(way)).clip(1e-6)
             begin = xp.minimum(r, 0 * r + light.radius)
-            trail = march(self.field, at, way / r, r, 0, GAP, True, start=begin)
+            trail = self.field.march(at, way / r, r, start=begin, halvings=0, gap=GAP, whole=True)
             return np.asarray(xp.to_numpy((trail.hit == INF) * xp.exp(-trail.depth)))
 
     def _segments(self) -> None:
@@ -353,17 +352,16 @@ def _aside(r: np.ndarray, radius: float, sent: np.ndarray) -> np.ndarray:
 
 def box_of(field: SolidField, wanted: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """The least and the greatest coordinates (3,) of where those objects may be that are wanted (N,)."""
-    low, high = [], []
-    for solid, its in zip(field.solids, wanted.tolist(), strict=True):
-        if its and solid.draws:
-            back, shift = (np.asarray(field.xp.to_numpy(part), np.float64) for part in solid.frame.outer)
-            back = inverses(back)
-            if solid.box is None:
-                half, middle = solid.ball * np.linalg.norm(back, axis=1), -back @ shift
-            else:
-                first, last = (np.asarray(field.xp.to_numpy(side), np.float64)[:, 0] for side in solid.box)
-                half = abs(back) @ (last - first) / 2
-                middle = back @ ((first + last) / 2 - shift)
-            low.append(middle - half)
-            high.append(middle + half)
-    return np.min(low or [np.zeros(3)], axis=0), np.max(high or [np.zeros(3)], axis=0)
+    rows = field.objects.rows[wanted.astype(bool) & field.objects.flagged(DRAWS)]
+    if not len(rows):
+        return np.zeros(3), np.zeros(3)
+    back = inverses(rows["map"][:, :9].reshape(-1, 3, 3).astype(np.float64))
+    low, high = rows["low"].astype(np.float64), rows["high"].astype(np.float64)
+    boxed = ((rows["flags"] & BOXED) > 0)[:, None]
+    half = np.where(
+        boxed,
+        (abs(back) @ ((high - low) / 2)[:, :, None])[:, :, 0],
+        rows["ball"][:, None] * np.linalg.norm(back, axis=2),
+    )
+    middle = (back @ (boxed * ((low + high) / 2) - rows["map"][:, 9:])[:, :, None])[:, :, 0]
+    return (middle - half).min(0), (middle + half).max(0)

@@ -10,10 +10,9 @@ last. Two parts are learned:
 2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
    by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
 
-A third answers for whole segments: the length of half a ray inside a leaf (`march.py`).
-
-The first two say how their answers change with what they are asked, written by hand: a surface's normal is
-the gradient of the distance behind the last object.
+Files of weights may also have layers that told the length of half a ray in a leaf; nothing asks them. Both
+parts say how their answers change with what they are asked, written by hand: a surface's normal is the
+gradient of the distance behind the last object.
 """
 
 from __future__ import annotations
@@ -89,7 +88,7 @@ def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
 EMPTY = 100.0  # world units: the distance where nothing has been met
 RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
-SEGMENT = 5  # numbers that tell a ray in a leaf, see `folded`
+SEGMENT = 5  # numbers that told a ray in a leaf
 
 
 @dataclass(frozen=True, slots=True)
@@ -103,8 +102,8 @@ class SolidConfig:
     hidden: int = 0  # rectified units between the codes and the weights
     paint_lines: int = 2  # lines of which the highest opens the gate of colour
     kind_lines: int = 2  # and that of medium
-    segment: int = 0  # hidden units of the two layers that answer for whole segments; 0: there are none
-    answered: int = 0  # geometries, the first ones, that these answer for; 0: all
+    segment: int = 0  # hidden units of two layers that answered for whole segments; 0: there are none
+    answered: int = 0  # geometries, the first ones, that these answered for; 0: all
 
 
 class Formula(str):
@@ -169,12 +168,6 @@ class SolidNetwork:
         own = (one @ lines.reshape(len(lines), -1)).reshape(lines.shape[1:])
         return norms(self.xp, own, one @ self.radius, RADIUS)
 
-    def segment(self, code: Array) -> Smooth:
-        """Layers of a code (C,) that answer for whole segments; empty where the network has none."""
-        first = self.codes[: self.config.answered]
-        known = not len(first) or bool((first == code).all(1).any())
-        return self._layers(code, self.segment_w, self.segment_b) if known else Smooth()
-
     def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
         one = self.lifted(code)
         return Smooth(
@@ -211,9 +204,7 @@ class SolidNetwork:
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
     def field(self, q: Array, layers: Smooth | Norms, gradient: bool) -> Array:
-        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M); of rays
-        (5, M), as `folded` tells them, and a segment's layers, their lengths (1, M).
-        """
+        """Distances of leaf coordinates (3, M), leaf units: (1, M), or with their gradients (4, M)."""
         if isinstance(layers, Smooth) and not gradient:
             return self.xp.smooth(q, layers)
         parts = [q[:, i : i + SMOOTH_BLOCK] for i in range(0, q.shape[1], SMOOTH_BLOCK)] or [q]
@@ -275,12 +266,6 @@ class SolidNetwork:
         gate = xp.concat([paint] * (len(memory) - 1 - switched) + [kind] * switched, 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 
-    def alone(self, reach: Array, cell: SolidCell) -> Array:
-        """Factors of distances (N,) up to a reach (N,) where nothing is met; 0 if a gate may not be open."""
-        least, n = cell.past * EMPTY + cell.bias - abs(cell.own) * reach, 1 + self.config.paint_lines
-        gates = (least[:1], least[1:n], least[n:])
-        return cell.candidate[0] * (self.xp.least(self.xp.concat([*map(self.xp.largest, gates)], 0)) >= 1)
-
     def partials(self, d: Array, state: Array, take: Array, cell: SolidCell) -> tuple[Array, Array]:
         """Derivatives (M,) of the distance behind an object by its own and by that before it."""
         candidate, bump = cell.candidate[0], cell.bump[0]
@@ -326,15 +311,3 @@ def _layer_shapes(name: str, code: int, inputs: int, width: int) -> dict[str, tu
     sizes = [inputs, width, width, 1]
     weights = {f"{name}_w.{i}": (code + 1, *sizes[i : i + 2]) for i in range(3)}
     return {**weights, **{f"{name}_b.{i}": (code + 1, sizes[i + 1]) for i in range(3)}}
-
-
-def folded(xp: Arrays, q: Array, way: Array) -> Array:
-    """Numbers (5, M) that tell a ray in a leaf, up to turns about y and mirrors, which change no leaf: its
-    point's distances from the axis and from the plane across it, and how fast the ray goes away from the
-    axis, about it, and away from the plane.
-    """
-    rho = xp.sqrt(q[0] * q[0] + q[2] * q[2])
-    a, c = q[0] / rho.clip(1e-9), q[2] / rho.clip(1e-9)
-    up = xp.select(q[1] < 0, 0 * rho - 1, 0 * rho + 1)
-    parts = (rho, up * q[1], a * way[0] + c * way[2], abs(a * way[2] - c * way[0]), up * way[1])
-    return xp.stack(parts, 0)

@@ -17,6 +17,7 @@ import numpy as np
 from scenelang.compiler.spaces import Stage
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.tables import inverses
 
 ROOTS = (0.8566748838545029, 0.733891856627126, 0.6287067210378087, 0.5385972572236101)  # of x^5 = x + 1
 SCATTER = np.array([37.719, 78.233, 12.99])  # of places, into turns of rays
@@ -84,34 +85,38 @@ def chords(count: int, radius: float) -> tuple[np.ndarray, np.ndarray]:
     return np.sqrt(r) * radius * off - way * half, 2 * half * way
 
 
-def hollow(field: SolidField) -> bool:
-    """Whether there may be hollows, which take more to light."""
-    return bool(field.skinned.any()) or not field.draws
-
-
 def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
     """Nodes on objects, ``many`` as hollows want; many chords find even the thin ones that glow."""
     xp, like = field.xp, field.network.codes
-    sizes = np.array([solid.extent for solid in field.solids])
+    rows = field.objects.rows
+    sizes = rows["extent"].astype(np.float64)
     glows = np.asarray(xp.to_numpy(field.glow(field.looks))).max(0, initial=0.0) > 0
     more = HOLLOW if many else 1
     shares = more * NODES * sizes**2 / max(float((sizes**2).sum()), 1e-9)
     counts = _bounded(np.ceil(shares.clip(LEAST[many], more * MOST)), ALL)
-    balls = np.array([s.frame.ball(1.0 + min(s.radius - 1.0, 0.2)) for s in field.solids])
+    balls = rows["reach"] * (1.0 + (rows["radius"] - 1.0).clip(None, 0.2)) + rows["moved"]
     tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
     parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
     lines = np.concatenate([np.zeros((6, 0)), *parts], 1).astype(np.float32)
     objects = np.repeat(np.arange(len(sizes)), tried)
-    line, at = _crossings(field, objects, lines[:3], lines[3:], np.where(glows, FINE, COARSE))
-    owner = objects[line]
+    linear = rows["map"][:, :9].reshape(-1, 3, 3).astype(np.float64)
+    back = inverses(linear)
+    ends = np.stack([lines[:3].T - rows["map"][objects, 9:], lines[3:].T], 2)
+    world = (back[objects] @ ends).astype(np.float32).transpose(2, 1, 0)  # begins and ways (3, K)
+    rates = rows["rate"][objects] * np.linalg.norm(lines[3:], axis=0)
+    begin, way = world
+    line, along = _crossings(field, objects, begin, way, rates, np.where(glows, FINE, COARSE)[objects])
+    owner, at = objects[line], lines[:3, line] + lines[3:, line] * along
     # each stands for as much of the surface behind the map
     area = (2 * np.pi * balls**2 / tried.clip(1))[owner].astype(np.float32)
     found = np.bincount(owner, minlength=len(sizes))
     number = line - (np.cumsum(tried) - tried)[owner]  # of an object's chords
     kept = ~glows[owner] | (number % (found // GLOWING).clip(1)[owner] == 0)
     place = xp.array(np.concatenate([at, owner[None], kept[None]]).astype(np.float32), like)
-    owner, at, area = (xp.array(part, like) for part in (owner, at, area))
-    return _settled(field, stage, field.before(owner, at), owner, area, place)
+    p = np.ascontiguousarray(begin[:, line] + way[:, line] * along)
+    shrunk = back * abs(np.linalg.det(linear))[:, None, None]  # of areas, with normals
+    across = np.moveaxis(shrunk.astype(np.float32)[owner], 0, -1)  # (3, 3, K)
+    return _settled(field, stage, p, across, area, place)
 
 
 def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
@@ -122,34 +127,39 @@ def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
 
 
 def _crossings(
-    field: SolidField, objects: np.ndarray, begin: np.ndarray, way: np.ndarray, parts: np.ndarray
+    field: SolidField,
+    objects: np.ndarray,
+    begin: np.ndarray,
+    way: np.ndarray,
+    rates: np.ndarray,
+    parts: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Lines (k,) that meet the surfaces of their objects, and where (3, k), by steps that are as long as the
-    distance, and at least so small a part of a line.
+    """Lines (k,) that meet the surfaces of their objects (K,), and how far along (k,), from 0 to 1.
+
+    Lines begin at (3, K) and go all the way (3, K). Steps are as long as the distance, which changes at rates
+    (K,) at most, and at least so small a part of a line.
     """
-    xp, like = field.xp, field.network.codes
 
     def distance(index: np.ndarray, t: np.ndarray) -> np.ndarray:
-        at = xp.array(begin[:, index] + way[:, index] * t, like)
-        return np.asarray(xp.to_numpy(field.own(xp.array(objects[index], like), at)))
+        return np.asarray(field.own(objects[index], begin[:, index] + way[:, index] * t)[0])
 
-    rates = np.array([solid.rate for solid in field.solids])[objects] * np.sqrt((way * way).sum(0))
     index, t = np.arange(len(objects)), np.zeros(len(objects), np.float32)
-    d, lines, places = distance(index, t), [index[:0]], [begin[:, :0]]
+    d, lines, places = distance(index, t), [index[:0]], [t[:0]]
     while len(index):
-        step = np.maximum(abs(d) / rates[index], 1 / parts[objects[index]]).astype(np.float32)
+        step = np.maximum(abs(d) / rates[index], 1 / parts[index]).astype(np.float32)
         past = distance(index, t + step)
         met = np.flatnonzero((past < 0) != (d < 0))
-        share = t[met] + step[met] * d[met] / (d[met] - past[met])
         lines.append(index[met])
-        places.append(begin[:, index[met]] + way[:, index[met]] * share)
+        places.append(t[met] + step[met] * d[met] / (d[met] - past[met]))
         on = np.flatnonzero(t + step < 1)
         index, t, d = index[on], (t + step)[on], past[on]
-    return np.concatenate(lines), np.concatenate(places, 1).astype(np.float32)
+    return np.concatenate(lines), np.concatenate(places).astype(np.float32)
 
 
-def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Array, place: Array) -> Nodes:
-    """Nodes at points (3, K) drawn onto the surface; without those that are covered."""
+def _settled(field: SolidField, stage: Stage, p: Array, across: Array, area: Array, place: Array) -> Nodes:
+    """Nodes at points (3, K) drawn onto the surface, whose normals maps pull ``across`` (3, 3, K); without
+    those that are covered.
+    """
     xp, weight = field.xp, None
     reach = 0 * p[0] + 4 * COVERED
     for _ in range(NEWTON):
@@ -164,15 +174,12 @@ def _settled(field: SolidField, stage: Stage, p: Array, owner: Array, area: Arra
     inside = field.near(p - INSIDE * n, reach, every=True)
     material = field.material(inside)
     weight = weight * (inside.distance < 0) * ~material.medium * (slope > FLAT)
-    if len(field.solids) > 1 and not field.media:  # where two touch nobody sees their nodes
+    if len(field) > 1 and not field.media:  # where two touch nobody sees their nodes
         before = field.near(p + BEFORE * n, reach)
         weight = weight * (before.distance / (BEFORE * slope.clip(FLAT))).clip(0.0, 1.0)
     if stage.ground is not None:
         weight = weight * ((p[1] - stage.ground.y) / COVERED).clip(0.0, 1.0)
     kept = xp.where(weight > 0)
-    linear = np.moveaxis(np.asarray(xp.to_numpy(field.linear), np.float64), -1, 0)
-    shrunk = np.linalg.inv(linear) * abs(np.linalg.det(linear))[:, None, None]  # of areas, with normals
-    across = xp.take(xp.array(np.moveaxis(shrunk, 0, -1).astype(np.float32), p), owner)  # (3, 3, K)
     pulled = (across * n[:, None]).sum(0)
     length = xp.sqrt((pulled * pulled).sum(0)).clip(1e-9)
     area, place = weight * area / length, xp.concat([place, pulled / length], 0)
