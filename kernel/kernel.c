@@ -113,10 +113,11 @@ int64_t NAME(field)(const Scene *s, int64_t n, const float *p, const float *reac
     if (!look && !owner)
         return gradient ? asked(s, n, p, reach, distance, gradient, 0, 0, scratch, GRADIENT)
                         : asked(s, n, p, reach, distance, 0, 0, 0, scratch, DISTANCE);
-    return asked(s, n, p, reach, distance, gradient, look, owner, scratch, ALL);
+    return gradient ? asked(s, n, p, reach, distance, gradient, look, owner, scratch, ALL)
+                    : asked(s, n, p, reach, distance, 0, look, owner, scratch, REGISTER_ | OWNER);
 }
-// Distances of objects alone, whatever else there is, and their gradients (3, n), at points (3, n) with numbers from 0;
-// or, unless null, their colours (3, n) instead.
+// Distances of objects alone, whatever else there is, and unless null their gradients (3, n), at points (3, n) with numbers
+// from 0; or, unless null, their colours (3, n) instead.
 void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient, float *colour) {
     float *to = colour ? colour : gradient;
     for (int64_t i = 0; i < n; i += W) {
@@ -129,15 +130,17 @@ void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p,
             M mine;
             for (int j = 0; j < W; j++) mine[j] = i + j < n && object[i + j] == object[i + k] ? -1 : 0;
             V slope, local, own = mapped(o->map, q);
-            if (!colour) d = sel(mine, leaf_slope(s, o, own, 1, &slope, &local), d);
+            if (gradient) d = sel(mine, leaf_slope(s, o, own, 1, &slope, &local), d);
+            else if (!colour) d = sel(mine, leaf_distance(s, o, own, 1, &local), d);
             else if (o->texture < 0) slope = (V){all(o->look[0]), all(o->look[1]), all(o->look[2])};
             else {
                 leaf_distance(s, o, own, 1, &local);
                 slope = coloured(s->texture + o->texture, local);
             }
-            g = choose(mine, slope, g);
+            if (to) g = choose(mine, slope, g);
         }
         if (!colour) store(distance, n, i, d);
+        if (!to) continue;
         store(to, n, i, g.x); store(to + n, n, i, g.y); store(to + 2 * n, n, i, g.z);
     }
 }

@@ -109,13 +109,14 @@ class Kernel:
         every: bool = False,
     ) -> Asked:
         """The field at points (3, M), exact where D is less than a reach, (M,) or one, in world units;
-        elsewhere D is anything from there on, 100 where no object is near. ``every`` asks for all there is.
+        elsewhere D is anything from there on, 100 where no object is near. ``every`` asks for registers and
+        owners, too.
         """
         points = np.ascontiguousarray(points, np.float32)
         count, rows = points.shape[1], int(tables.scene["rows"])
         assert points.shape == (3, count)
         reach = np.ascontiguousarray(np.broadcast_to(np.asarray(reach, np.float32), (count,)))
-        slopes, looks = count * (gradient or every), count * every
+        slopes, looks = count * gradient, count * every
         answers = np.empty(count, np.float32), np.empty((3, slopes), np.float32)
         more = np.empty((rows, looks), np.float32), np.empty(looks, np.int32)
         scene = tables.scene.ctypes.data
@@ -126,19 +127,23 @@ class Kernel:
         return Asked(*answers, *more, met)
 
     def own(
-        self, tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]
+        self,
+        tables: Tables,
+        objects: npt.NDArray[np.integer],
+        points: npt.NDArray[Any],
+        gradient: bool = True,
     ) -> tuple[Floats, Floats]:
         """Distances (M,) of objects alone by their numbers (M,), from 0, whatever else is at points (3, M),
-        and the gradients (3, M) of these.
+        and the gradients (3, M) of these, or none.
         """
         numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
         count = len(numbers)
         assert points.shape == (3, count)
         assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
-        distance, gradient = np.empty(count, np.float32), np.empty((3, count), np.float32)
-        places = [part.ctypes.data for part in (numbers, points, distance, gradient)]
+        distance, slope = np.empty(count, np.float32), np.empty((3, count * gradient), np.float32)
+        places = [part.ctypes.data if part.size else None for part in (numbers, points, distance, slope)]
         self._library.own(self.variant, tables.scene.ctypes.data, count, *places, None)
-        return distance, gradient
+        return distance, slope
 
     def worn(self, tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]) -> Floats:
         """Colours (3, M) of objects alone by their numbers (M,), from 0, at points (3, M), with textures."""

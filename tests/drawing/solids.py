@@ -150,7 +150,7 @@ def everywhere(solids: SolidField, p: np.ndarray, reach: float = 1e6) -> Asked:
     """What a field answers at points (3, M), within a reach or where every object is met."""
     xp, like = solids.xp, solids.network.codes
     with xp.inference():
-        return solids.near(xp.array(np.float32(p), like), reach, every=True)
+        return solids.near(xp.array(np.float32(p), like), reach, gradient=True, every=True)
 
 
 MIXED = (

@@ -55,8 +55,8 @@ def hold(field: SolidField, tables: Tables, seed: int = 0, loose: float = 0.01) 
     """What the kernel answers is what the network does, but for a part ``loose`` where slopes are abrupt."""
     p, reach, size = points(field, seed)
     with field.xp.inference():
-        met = PlainField(field.network, *field.rows, field.paints).near(p, reach, every=True)
-    found = KERNEL.field(tables, p, reach, every=True)
+        met = PlainField(field.network, *field.rows, field.paints).near(p, reach, gradient=True, every=True)
+    found = KERNEL.field(tables, p, reach, gradient=True, every=True)
     within = abs(met.distance) < reach
     assert within.mean() > 0.05
     assert abs(found.distance - met.distance)[within].max() < TOLERANCE * size
@@ -155,7 +155,7 @@ def test_layers_with_silu() -> None:
 
 
 def answers(tables: Tables, p: np.ndarray) -> list[np.ndarray]:
-    found = KERNEL.field(tables, p, 0.2, every=True)
+    found = KERNEL.field(tables, p, 0.2, gradient=True, every=True)
     return [part for part in found if isinstance(part, np.ndarray)]
 
 

@@ -24,7 +24,7 @@ def test_distances_of_trees_are_those_of_the_reference(seed: int) -> None:
     """Within the reach, on both sides of surfaces."""
     tree = random_tree(np.random.default_rng(seed), 3, (0.0, 0.5)[seed % 2])
     p, reach = points(seed, 1.5)
-    result = tree_field(tree, CLOSED).near(p, reach, every=True)
+    result = tree_field(tree, CLOSED).near(p, reach, gradient=True, every=True)
     truth = ExactField(tree_graph(tree)).at(p.astype(float)).d
     assert abs(np.clip(result.distance, -reach, reach) - np.clip(truth, -reach, reach)).max() < 2e-3
 

@@ -87,8 +87,8 @@ def hold(plain: PlainField, seed: int = 0, loose: float = 2e-3) -> None:
     tables = tables_of(plain)
     p, size = points(tables, seed)
     reach = (0.03 * 1.75 ** np.random.default_rng(seed).integers(0, 7, p.shape[1])).astype(np.float32)
-    expected = KERNEL.field(tables, p, reach, every=True)
-    d, gradient, register, owner, met = call(plain, "near", p, reach, every=True)
+    expected = KERNEL.field(tables, p, reach, gradient=True, every=True)
+    d, gradient, register, owner, met = call(plain, "near", p, reach, gradient=True, every=True)
     within = abs(expected.distance) < reach
     assert within.mean() > 0.05
     assert abs(d - expected.distance)[within].max() < TOLERANCE * size

@@ -409,7 +409,7 @@ class Lighting:
         """Points where rays meet solids, normals (3, K), colours, light from before them (R, K), coats."""
         xp = self.xp
         t = xp.take(trail.hit, index)
-        result = self.field.near(origin + way * (t + INTO), self.pace.gap, every=True)
+        result = self.field.near(origin + way * (t + INTO), self.pace.gap, gradient=True, every=True)
         sharp = xp.take(trail.soft, index) == 0
         left = _dot(result.gradient, way) > 0  # beyond an edge
         off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
@@ -418,7 +418,7 @@ class Lighting:
             t_off = xp.take(t, off) + INTO
             t_off = t_off + xp.select(left, 0 * t_off - self.pace.gap, self._ahead(result, way, off))
             begin = origin if origin.shape[1] == 1 else xp.take(origin, off)
-            again = self.field.near(begin + ways * t_off, self.pace.gap, every=True)
+            again = self.field.near(begin + ways * t_off, self.pace.gap, gradient=True, every=True)
             beyond = left & (_dot(again.gradient, ways) > 0)
             there = xp.where((_dot(again.gradient, again.gradient) > 0.01) & ~beyond)  # not past an edge
             off = xp.take(off, there)

@@ -85,9 +85,9 @@ class SolidField:
         """As `Kernel.field`, at points (3, M) anywhere: exact where D is less than a reach, (M,) or one."""
         return load_kernel().field(self.tables, p, reach, gradient, every)
 
-    def own(self, objects: Array, p: Array) -> tuple[Array, Array]:
-        """Distances (K,) from objects, whatever else is at points (3, K), and their gradients (3, K)."""
-        return load_kernel().own(self.tables, objects, p)
+    def own(self, objects: Array, p: Array, gradient: bool = True) -> tuple[Array, Array]:
+        """Distances (K,) from objects, whatever else is at points (3, K), and their gradients (3, K) if asked."""
+        return load_kernel().own(self.tables, objects, p, gradient)
 
     def worn(self, objects: Array, p: Array) -> Array:
         """Colours (3, K) of objects, whatever else is at points (3, K)."""

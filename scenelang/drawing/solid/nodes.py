@@ -141,7 +141,7 @@ def _crossings(
     """
 
     def distance(index: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return np.asarray(field.own(objects[index], begin[:, index] + way[:, index] * t)[0])
+        return np.asarray(field.own(objects[index], begin[:, index] + way[:, index] * t, gradient=False)[0])
 
     index, t = np.arange(len(objects)), np.zeros(len(objects), np.float32)
     d, lines, places = distance(index, t), [index[:0]], [t[:0]]

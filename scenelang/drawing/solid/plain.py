@@ -251,7 +251,7 @@ class PlainField(SolidField):
     def near(self, p: Array, reach: Array | float, gradient: bool = False, every: bool = False) -> Asked:
         """As `Kernel.field`, at points (3, M) anywhere: exact where D is less than a reach, (M,) or one."""
         xp, reach, size, met = self.xp, 0 * self.xp.frozen(p[0]) + reach, 1 + len(self.looks), 0
-        asked, states = (Wanted.ALL if every else Wanted.DISTANCE, 3 * (gradient or every)), []
+        asked, states = (Wanted.ALL if every else Wanted.DISTANCE, 3 * gradient), []
         far = float(reach.max()) if len(reach) else 0.0
         for at in _slices(max(len(reach), 1), POINTS):
             check_time(self.network.until_s)
@@ -262,8 +262,8 @@ class PlainField(SolidField):
         slope, owner = state[-3:] if asked[1] else state[:0], state[size] if every else state[0, :0]
         return Asked(state[0], slope, state[1:size] if every else state[:0], owner, met)
 
-    def own(self, objects: Array, p: Array) -> tuple[Array, Array]:
-        """Distances (K,) from objects, whatever else is at points (3, K), and their gradients (3, K)."""
+    def own(self, objects: Array, p: Array, gradient: bool = True) -> tuple[Array, Array]:
+        """As `SolidField.own`; gradients are there anyway."""
         found = 0 * self.xp.concat([p, p[:1]], 0)
         for solid, index, at in self._each(objects, p):
             d, g, _ = solid.distance(self.xp, at, True, True)
