@@ -86,7 +86,7 @@ class SolidField:
         return load_kernel().field(self.tables, p, reach, gradient, every)
 
     def own(self, objects: Array, p: Array, gradient: bool = True) -> tuple[Array, Array]:
-        """Distances (K,) from objects, whatever else is at points (3, K), and their gradients (3, K) if asked."""
+        """Distances (K,) from objects, whatever else is at points (3, K), and gradients (3, K) if asked."""
         return load_kernel().own(self.tables, objects, p, gradient)
 
     def worn(self, objects: Array, p: Array) -> Array:
