@@ -22,7 +22,7 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.closed import field_of
 from scenelang.drawing.kernel import Kernel
-from scenelang.drawing.tables import Tables
+from scenelang.drawing.tables import Tables, stage_rows
 from scenelang.language.evaluation import load
 from scenelang.language.reports import SceneError
 
@@ -59,8 +59,8 @@ def mutated(program: Program, seed: int) -> Program:
 
 @np.errstate(all="ignore")
 def ask(kernel: Kernel, program: Program, seed: int) -> None:
-    """Ask for the field of a Program anywhere, for rays and for cones; raises `ProgramError` where it holds
-    no scene.
+    """Ask for the field of a Program anywhere, for rays, cones and light; raises `ProgramError` where it
+    holds no scene.
     """
     rng = np.random.default_rng(seed)
     given = (program.vectors, program.tokens, program.brought(), program.paints())
@@ -83,6 +83,11 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
         assert (np.diff(trails.pieces["ray"]) >= 0).all()
     lamp, radius = rng.normal(size=3) * 10.0 ** rng.integers(-1, 2), float(rng.choice([0.0, 0.1, 3.0, 1e9]))
     kernel.cones(tables, lamp.astype(np.float32), radius, p, way)
+    if program.stage is not None and not (tables.scene["media"] or tables.detail.any()):
+        stage, lamps = stage_rows(program.stage, gap, tables.looks.glowing)
+        stage["eye"], lamps["at"] = p[:, 0], p[:, 1 : 1 + len(lamps)].T
+        across = int(rng.choice([1, 20, POINTS]))
+        kernel.shade(tables, stage, way[:, : POINTS // across * across].reshape(3, -1, across))
 
 
 def programs() -> list[Program]:
