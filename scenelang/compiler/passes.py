@@ -461,10 +461,10 @@ def check_media(graph: Graph, context: Context) -> Graph:
     for code, pairs in found.items():
         if pairs:
             leaf, medium = pairs[0]
-            lost = f"is not seen, as the medium `{medium.geometry}` after it takes its place"
+            taken = f"is not seen, as the medium `{medium.geometry}` after it takes its place"
             lit = f"is lit as if it had the shape of the medium `{medium.geometry}` around it"
             more = f", as {plural(len(pairs) - 1, 'solid')} more" * (len(pairs) > 1)
-            fact = f"this `{leaf.geometry}` {lost if code == 'W0405' else lit}{more}"
+            fact = f"this `{leaf.geometry}` {taken if code == 'W0405' else lit}{more}"
             labels = [Label(medium.span, "the medium")] if medium.span is not None else []
             help = f"carve it out: subtract {{ {medium.geometry} {{ … }} {leaf.geometry} {{ … }} }} beside it"
             context.diagnostics.add(code, fact, leaf.span, labels=labels, help=help)
@@ -472,7 +472,7 @@ def check_media(graph: Graph, context: Context) -> Graph:
 
 
 def _sides(leaf: Leaf, box: Box) -> Iterator[tuple[Point, Point]]:
-    """Points inside and outside of a solid, near its surface, on axes through its middle, if that is in it."""
+    """Points inside and outside of a solid near its surface, on axes through a middle that is in it."""
     middle = steps.composed(leaf.steps)[3::4]
     reach = dist((box[0], box[1], box[4]), (box[2], box[3], box[5]))
 
