@@ -383,6 +383,8 @@ def _warn(
     doubt = "the picture may be less exact than the model's figures"
     fact = f"{said} outside the measured range {low:g} to {high:g} of model `{context.manifest.name}`{others}"
     help = f"measured there: {figures}" if figures else doubt
+    if quantity == "texels":
+        help = "it lies on the leaf's own x and y: `scale` in the material's block makes it larger there"
     if quantity in _WRONG and abs(value) > WILD * high:
         help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
     context.diagnostics.add(code, fact, leaf.span, help=help)

@@ -409,3 +409,11 @@ def test_many_solids_in_a_medium_are_looked_at_in_bounded_steps() -> None:
     (one,) = [d for d in nsg.check_text(f"sky(); box {{ scale(4); {MIST} }} {balls}") if d.code == "W0406"]
     assert "as 3 solids more" in one.message
     assert time.process_time() - start < 2
+
+
+def test_the_help_for_a_dense_texture_leads_to_a_scene() -> None:
+    thin = "box {{ scale(1, 0.02, 1); material wood {{ {} }} }}"
+    (only,) = nsg.check_text(thin.format(""))
+    assert only.code == "W0511"
+    assert "`scale` in the material's block" in (only.help or "")
+    assert [*nsg.check_text(thin.format("scale(1, 50);"))] == []
