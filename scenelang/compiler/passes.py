@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection, Sequence
+from collections.abc import Callable, Collection, Iterator, Sequence
 from functools import partial
 from itertools import product
 from math import cos, dist, exp, hypot, inf, sin, sqrt, tan
@@ -15,6 +15,7 @@ from scenelang.compiler import rewrites, steps
 from scenelang.compiler.chain import LevelsError, split_levels
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import (
+    BLACK,
     Fold,
     Graph,
     Invariant,
@@ -34,7 +35,7 @@ from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.rewrites import Context, cover_of, covered
 from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Light, Space, Stage
 from scenelang.compiler.steps import Affine, Skin, Step
-from scenelang.language.diagnostics import Diagnostics, Label, Span
+from scenelang.language.diagnostics import Diagnostics, Label, Span, plural
 from scenelang.language.scene import Scene
 
 
@@ -382,6 +383,8 @@ def _warn(
     doubt = "the picture may be less exact than the model's figures"
     fact = f"{said} outside the measured range {low:g} to {high:g} of model `{context.manifest.name}`{others}"
     help = f"measured there: {figures}" if figures else doubt
+    if quantity == "texels":
+        help = "it lies on the leaf's own x and y: `scale` in the material's block makes it larger there"
     if quantity in _WRONG and abs(value) > WILD * high:
         help = f"it is more than {WILD} times what was measured: nothing of the picture may be right"
     context.diagnostics.add(code, fact, leaf.span, help=help)
@@ -416,6 +419,78 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
         context.diagnostics.add("W0403", fact, holder.span, help=help)
     return graph
+
+
+_SIDES: Final = [tuple(sign * (i == axis) for i in range(3)) for axis in range(3) for sign in (1.0, -1.0)]
+_MOST_SIDES: Final = 4  # of six, on which a solid has to be in a medium
+_BESIDE: Final = 0.01  # of the way from a solid's middle to its surface
+
+
+def check_media(graph: Graph, context: Context) -> Graph:
+    """Warn of solids that a medium takes away, and of those that have its normals, by the exact fold.
+
+    A medium takes what lies in it of all that is written before. On a solid that is written after it the
+    fold's distance is still the medium's, which is deeper. Before: STREAM. After: unchanged.
+    """
+    rows, space = graph.rows(), graph.space
+    media = [row.leaf for row in rows if row.leaf.look.material == "volumetric" and not row.cuts]
+    if graph.stage is None or not context.whole or not media:
+        return graph
+    boxes, tests = [leaf_box(leaf, 0.0, space) for leaf in media], 0
+    found: dict[str, list[tuple[Leaf, Leaf]]] = {"W0405": [], "W0406": []}
+    for row in rows:
+        leaf, box = row.leaf, leaf_box(row.leaf, 0.0, space)
+        known = leaf.geometry in GEOMETRIES and leaf.look.material != "volumetric"
+        if row.cuts or row.op == "intersect" or not known or not any(overlap(box, other) for other in boxes):
+            continue
+        tests += 2 * len(_SIDES) * len(rows)
+        if tests > _TESTS:
+            break
+        around = list[tuple[str, Leaf]]()
+        for within, beside in _sides(leaf, box):
+            (inner, own), (outer, medium) = (_folded(graph.root, p, space) for p in (within, beside))
+            lost = own is not None and own.look.material == "volumetric"
+            medium = own if lost else medium
+            if medium is None or medium.look.material != "volumetric" or (not lost and own is not leaf):
+                continue
+            depth = inner if lost else outer
+            if depth < -dist(within, beside) and exp((medium.look.density or EXTINCTION) * depth) > _DIM:
+                around.append(("W0405" if lost else "W0406", medium))
+        for code, pairs in found.items():
+            seen = [medium for kind, medium in around if kind == code]
+            if len(seen) >= _MOST_SIDES and (code == "W0405" or leaf.look.glow == BLACK):
+                pairs.append((leaf, seen[0]))
+    for code, pairs in found.items():
+        if pairs:
+            leaf, medium = pairs[0]
+            taken = f"is not seen, as the medium `{medium.geometry}` after it takes its place"
+            lit = f"is lit as if it had the shape of the medium `{medium.geometry}` around it"
+            more = f", as {plural(len(pairs) - 1, 'solid')} more" * (len(pairs) > 1)
+            fact = f"this `{leaf.geometry}` {taken if code == 'W0405' else lit}{more}"
+            labels = [Label(medium.span, "the medium")] if medium.span is not None else []
+            help = f"carve it out: subtract {{ {medium.geometry} {{ … }} {leaf.geometry} {{ … }} }} beside it"
+            context.diagnostics.add(code, fact, leaf.span, labels=labels, help=help)
+    return graph
+
+
+def _sides(leaf: Leaf, box: Box) -> Iterator[tuple[Point, Point]]:
+    """Points inside and outside of a solid near its surface, on axes through a middle that is in it."""
+    middle = steps.composed(leaf.steps)[3::4]
+    reach = dist((box[0], box[1], box[4]), (box[2], box[3], box[5]))
+
+    def at(way: Sequence[float], far: float) -> Point:
+        x, y, z = (m + far * w for m, w in zip(middle, way, strict=True))
+        return x, y, z
+
+    def inside(p: Point) -> bool:
+        return _distance(leaf.geometry, leaf.steps, p) < 0.0
+
+    for way in _SIDES if inside(at(_SIDES[0], 0.0)) else ():
+        near, far = 0.0, reach
+        for _ in range(16):
+            half = (near + far) / 2
+            near, far = (half, far) if inside(at(way, half)) else (near, half)
+        yield at(way, near * (1 - _BESIDE)), at(way, far * (1 + _BESIDE))
 
 
 def _folded(fold: Fold, eye: Point, space: Space) -> tuple[float, Leaf | None]:
@@ -606,6 +681,7 @@ PASSES: tuple[Pass, ...] = (
     Pass(check_levels),
     Pass(rewrites.flatten, frozenset({Invariant.STREAM})),
     Pass(check_eye),
+    Pass(check_media),
     Pass(check_seen),
     Pass(rewrites.drop_unseen),
     Pass(rewrites.drop_hidden),

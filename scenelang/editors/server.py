@@ -128,13 +128,15 @@ def code_actions(
 
 
 def _is_ours(document: Document, d: Diagnostic) -> bool:
-    return d.fix is not None and all(e.span.source.name == document.source.name for e in d.fix.edits)
+    fix = d.fix or d.guess
+    return fix is not None and all(e.span.source.name == document.source.name for e in fix.edits)
 
 
 def _quick(document: Document, d: Diagnostic, preferred: bool) -> types.CodeAction:
-    assert d.fix is not None
-    edits = [types.TextEdit(document.lines.span(e.span), e.replacement) for e in d.fix.edits]
-    shown, title = to_diagnostic(d, document), d.fix.message[:1].upper() + d.fix.message[1:]
+    fix = d.fix or d.guess
+    assert fix is not None
+    edits = [types.TextEdit(document.lines.span(e.span), e.replacement) for e in fix.edits]
+    shown, title = to_diagnostic(d, document), fix.message[:1].upper() + fix.message[1:]
     edit, kind = types.WorkspaceEdit(changes={document.uri: edits}), types.CodeActionKind.QuickFix
     return types.CodeAction(title, kind, [shown] if shown else None, preferred, edit=edit)
 

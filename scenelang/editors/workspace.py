@@ -357,11 +357,16 @@ def _carried(diagnostic: Diagnostic, edit: TextChange, source: SourceFile) -> Di
     if span is None:
         return None
     labels = [Label(at, label.message) for label in d.labels if (at := carried(label.span)) is not None]
-    fix = None
-    if d.fix is not None:
-        edits = [Change(at, e.replacement) for e in d.fix.edits if (at := carried(e.span)) is not None]
-        fix = Fix(d.fix.message, tuple(edits)) if len(edits) == len(d.fix.edits) else None
-    return Diagnostic(d.code, d.message, span, tuple(labels), d.help, fix)
+
+    def moved(fix: Fix | None) -> Fix | None:
+        edits = (
+            [Change(at, e.replacement) for e in fix.edits if (at := carried(e.span)) is not None]
+            if fix
+            else []
+        )
+        return Fix(fix.message, tuple(edits), fix.guess) if fix and len(edits) == len(fix.edits) else None
+
+    return Diagnostic(d.code, d.message, span, tuple(labels), d.help, moved(d.fix), moved(d.guess))
 
 
 class Workspace:

@@ -50,15 +50,17 @@ def member_advice(name: tree.Name) -> str | None:
 def in_library(stmt: tree.Call, place: Site) -> str | None:
     """Help for a statement whose name is that of a shape of the library, unless more is known of it."""
     name = stmt.name.text.lower()
-    shape = foreign.SHAPES.get(name)
-    solid = likely_dimensions(place.session, stmt.span.source) == (3,)
-    if shape is None or solid or name in foreign.STATEMENTS:
+    likely = likely_dimensions(place.session, stmt.span.source)
+    files = {2: (library.SHAPES, foreign.SHAPES), 3: (library.SOLIDS, foreign.SOLIDS)}
+    found = [(file, shapes[name]) for file, shapes in map(files.__getitem__, likely) if name in shapes]
+    if not found or name in foreign.STATEMENTS:
         return None
+    file, shape = found[0]
     for alias, binding in place.scope.visible():
         value = binding.value
-        if isinstance(value, FileContext) and value.source.name == library.called(library.SHAPES):
+        if isinstance(value, FileContext) and value.source.name == library.called(file):
             return f"{alias}.{shape}"
-    return f'import "{library.SHAPES}" as s; then s.{shape}'
+    return f'import "{file}" as s; then s.{shape}'
 
 
 # ---------------------------------------------------------------- the plane or space
@@ -157,8 +159,8 @@ def unknown_member(
         if element is not None and element.kind == "element" and fact in ("size", "centre"):
             return f"its file does not say how large or where `{owner}` was; learn it again", None
         help, fix = did_you_mean(rest, known, last, effort=place.report.effort)
-        shape = foreign.SHAPES.get(rest.lower()) if library.holds(exported.source) else None
-        if help is None and shape is not None:
+        shape = library.shapes_of(exported.source).get(rest.lower())
+        if shape is not None and (fix is None or fix.guess):
             return f"it is called {alias}.{shape} here", None
         return help or (f"it has {listing(known)}" if known else f"it defines no {what}"), fix
 

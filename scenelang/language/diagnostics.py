@@ -94,10 +94,11 @@ class Edit(Record):
 
 
 class Fix(Record):
-    """A change that mends the mistake and is safe to apply unseen."""
+    """A change that mends the mistake, and is safe to apply unseen unless it is a guess."""
 
     message: str
     edits: tuple[Edit, ...]
+    guess: bool = False
 
 
 class Diagnostic(Record):
@@ -110,6 +111,7 @@ class Diagnostic(Record):
         labels: further places.
         help: advice.
         fix: a safe change.
+        guess: a change that editors offer, and nothing applies unseen.
     """
 
     code: str
@@ -118,6 +120,7 @@ class Diagnostic(Record):
     labels: tuple[Label, ...] = ()
     help: str | None = None
     fix: Fix | None = None
+    guess: Fix | None = None
 
     @property
     def severity(self) -> Severity:
@@ -165,7 +168,9 @@ class Diagnostics:
         if fix is not None and len(fix.edits) > MOST_EDITS:
             fix = None
         given = tuple([Label(label.span, _cut(label.message)) for label in labels])
-        self.items.append(Diagnostic(code, _cut(message), span, given, _cut(help) if help else help, fix))
+        fix, guess = (None, fix) if fix is not None and fix.guess else (fix, None)
+        said = _cut(help) if help else help
+        self.items.append(Diagnostic(code, _cut(message), span, given, said, fix, guess))
         return True
 
     @property
@@ -264,7 +269,8 @@ def did_you_mean(
 ) -> tuple[str | None, Fix | None]:
     """Help text and fix for a misspelt ``name`` at ``span``; both None where nothing is close.
 
-    Where several names are equally near there is no fix, and the help names the first three.
+    Where several names are equally near there is no fix, and the help names the first three. A fix is a guess
+    unless only case, underscores or a plural differ: `cube` may be `tube`, or a shape that is not there.
     """
     if not (ranking := ranked(name, known, slips, effort)):
         return None, None
@@ -278,7 +284,8 @@ def did_you_mean(
     axis = name[-1:] in "xyzXYZ" and name[:-1].rstrip("_").lower() == near[0].lower()
     start = best < 2 or name[:1].lower() == near[0][:1].lower()
     sure = digits == others and not axis and best <= 2 and start
-    fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),)) if sure else None
+    guess = best > _JOINT
+    fix = Fix(f"rename to `{near[0]}`", (Edit(span, near[0]),), guess) if sure else None
     return f"did you mean `{near[0]}`?", fix
 
 

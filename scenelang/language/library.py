@@ -7,12 +7,13 @@ A path ``std/shapes`` means a file of this package wherever it is written. A use
 from __future__ import annotations
 
 import re
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import field
 from pathlib import Path
 from typing import Final, NamedTuple
 
 from scenelang.assets.records import Record
+from scenelang.language import foreign
 from scenelang.language.diagnostics import Edit, Fix, SourceFile, Span
 from scenelang.language.scopes import outwards
 
@@ -52,6 +53,11 @@ def called(name: str) -> str:
 def holds(source: SourceFile) -> bool:
     """Test whether a text is a file of the library."""
     return source.name.startswith("<std/")
+
+
+def shapes_of(source: SourceFile) -> Mapping[str, str]:
+    """How the shapes of a file of the library are called, by many names in small letters."""
+    return {called(SHAPES): foreign.SHAPES, called(SOLIDS): foreign.SOLIDS}.get(source.name, {})
 
 
 def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:

@@ -459,7 +459,7 @@ def _report_insertion(tokens: Tokens, report: Report, at: int, names: list[str],
     code, place = _CODES.get(first, "E0126"), (end, end)
     message, help, labels, fix = f"missing {_listed(names)}", None, [], None
     if names == ["as", "NAME"]:
-        help = 'write import "std/shapes" as s; and what it has as s.disc(0.3);'
+        help = f"write import {tokens.text(at - 1)} as s; and what it has with s. before its name"
     elif names == ["{", "}"]:
         help = "braces are mandatory here, even around nothing"
     elif len(names) > 1 and names[-1] in (";", "}") and set(names) - {")", "]", "}", ";"}:

@@ -11,7 +11,6 @@ from typing import Any, Final
 from scenelang.assets.records import Record
 from scenelang.language import library, tree
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, Effort, Fix, Label, SourceFile, Span
-from scenelang.language.foreign import SHAPES
 from scenelang.language.library import Calls
 from scenelang.language.limits import MAX_COMPARED, Halt
 
@@ -126,10 +125,12 @@ class Reporter(Record, frozen=False):
         calls = self.calls
         site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
-            labels, fix, span = (Label(span, "which is used here"),), None, site
-            alias, _, module = site.text.rpartition(".")
-            if not help and alias and module in SHAPES:
-                help = f"it is called {alias}.{SHAPES[module]}"
+            if not code.startswith("E032"):  # a limit of the scene
+                message = f"the arguments of `{site.text}` do not fit: {message}"
+                alias, _, name = site.text.rpartition(".")
+                shape = library.shapes_of(span.source).get(name)
+                help = f"it is called {alias}.{shape}" if shape else None
+            labels, fix, span = (), None, site
         elif calls is not None:
             labels = (*labels, *(Label(call, "in this call") for call in islice(calls.outwards(), 2)))
         if self.reported.setdefault((span.source, span), code) != code or self.follows(code, span):

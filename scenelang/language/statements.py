@@ -644,12 +644,12 @@ def _advice(stmt: tree.Call, place: Site) -> Advice:
         if (here := _boolean(stmt)) is not None:
             return f"it is called `{here}` here and has a block: {here} {{ square; star; }}", None
         help, fix = advice.in_library(stmt, place), None
-    if fix is None:
-        known, fix = instead(text, foreign.WORDS, candidates, name.span)
-        help = known or help
+    if fix is None or fix.guess:
+        known, sure = instead(text, foreign.WORDS, candidates, name.span)
+        help, fix = known or help, sure or fix
     if fix is not None and stmt.body is not None and fix.edits[0].replacement in words.NODES:
         span = Span(name.span.source, name.span.start, stmt.body.span.start)  # without parentheses
-        fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),))
+        fix = Fix(fix.message, (Edit(span, f"{fix.edits[0].replacement} "),), fix.guess)
     meant = foreign.WORDS.get(text, "")
     if help is None and place.kind == "object" and meant in words.OPERATIONS.keys() - words.TRANSFORMS.keys():
         help = f"it is called `{meant}` here and stands in a material: {advice.material_advice(place, meant)}"

@@ -186,7 +186,7 @@ def test_what_cannot_be_fixed_is_reported(folder: Folder) -> None:
 
 def test_a_fix_uncovers_the_next_mistake(folder: Folder) -> None:
     """Rounds go on until nothing is found: the angle is met only once the name is right."""
-    name = folder.write("a.nsg", "modul m(x) { squar { rotate(360.00) } }\nm(45)\n")
+    name = folder.write("a.nsg", "modul m(x) { Square { rotate(360.00) } }\nm(45)\n")
     folder.run("check", name, "--fix", code=0)
     assert folder.read(name) == "module m(x) { square { rotate(360.00deg); } }\nm(45);\n"
 

@@ -416,3 +416,10 @@ def test_proofs(folder: Folder) -> None:
     assert "p.png: 100 % of pixels proved right to 1/255" in ran.stderr
     exact = nsg.render(scene, backend="reference").to_uint8().astype(int)
     assert abs(picture("p.png") - exact).max() <= 1
+
+
+def test_a_picture_of_an_animation_says_that_it_is_one_frame(folder: Folder) -> None:
+    name = folder.write("a.nsg", "animate(seconds = 1, fps = 4); star { rotate(1turn * u); }")
+    shown = folder.run("render", name, "-o", "a.png", "--size", "16x16", code=0).stderr
+    assert "frame 0 of 4; `-o NAME.webp`" in shown
+    assert "frame 0 of" not in folder.run("render", name, "-o", "a.png", "--frame", "1", code=0).stderr

@@ -36,7 +36,8 @@ from tests.compiler.random_scenes import full_scene
 EDGE = 1e-9  # world units
 LEAST = 0.01
 MOST = 1e-7  # of a colour in [0, 1]: what rounding may change
-CHECKS = {"check_eye", "check_levels", "check_seen", "check_trained"}  # report, and never change a graph
+# these report, and never change a graph
+CHECKS = {"check_eye", "check_levels", "check_media", "check_seen", "check_trained"}
 MANIFEST = load_manifest("shapes2d")
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import dataclasses
+import time
 
 import numpy as np
 import pytest
@@ -366,3 +367,53 @@ def test_light_that_may_be_wrong_is_told_once() -> None:
     assert "there are 102 objects" in found.message
     assert found.span is not None
     assert found.span.locate()[0][0] == 2  # of the 101st object
+
+
+MIST = "material volumetric { density(0.001); }"
+BALLS = "sphere { scale(0.6); translate(-0.7, 0, 0); } sphere { scale(0.6); translate(0.7, 0, 0); }"
+PAIR = "union { box { scale(0.7); } cone { scale(0.5); translate(1, 0, 0); } }"
+IN_MEDIA = [  # what is drawn, and the code
+    ("sphere;", f"sphere; box {{ scale(4); {MIST} }}", "W0405"),
+    ("sphere;", f"box {{ scale(4); {MIST} }} sphere;", "W0406"),
+    (BALLS, f"{BALLS} sphere {{ scale(2); {MIST} }}", "W0405"),
+    (PAIR, f"sphere {{ scale(3); {MIST} }} {PAIR}", "W0406"),
+    ("sphere;", f"sphere; subtract {{ box {{ scale(4); {MIST} }} sphere; }}", ""),
+    ("sphere;", f"subtract {{ box {{ scale(4); {MIST} }} sphere; }} sphere;", ""),
+    (BALLS, f"{BALLS} torus {{ scale(4); {MIST} }}", ""),
+    (BALLS, f"intersect {{ union {{ {BALLS} }} box {{ scale(4); {MIST} }} }}", ""),
+]
+
+
+def test_solids_that_a_medium_takes_away_or_gives_its_normals() -> None:
+    """A medium of hardly any density is not seen: what it changes in a picture is not its own."""
+    pictures = {}
+    for solids, text, code in IN_MEDIA:
+        found = [d.code for d in nsg.check_text(CAMERA + text)]
+        assert found == [code] * bool(code), text
+        for shown in (solids, text):
+            if shown not in pictures:
+                pictures[shown] = np.asarray(draw_exact(nsg.loads(CAMERA + shown).sized((8, 8))))
+        off = np.abs(pictures[text] - pictures[solids])[..., :3].max()
+        assert (off > 0.1) == bool(code), (text, off)
+    glows = f"box {{ scale(4); {MIST} }} sphere {{ material diffuse {{ color(#000); glow(#fff); }} }}"
+    dense = glows.replace("0.001", "90").replace("glow(#fff);", "")  # nothing of the solid is seen
+    half = f"sphere {{ translate(0, 0.2, 0); }} box {{ scale(2); translate(0, -1.2, 0); {MIST} }}"
+    for text in (glows, dense, half):
+        assert [*nsg.check_text(CAMERA + text)] == [], text
+
+
+def test_many_solids_in_a_medium_are_looked_at_in_bounded_steps() -> None:
+    moves = "scale(0.01); translate(0.05 * (i % 20), 0.05 * floor(i / 20), 0);"
+    balls = f"for (i in 0..<400) {{ sphere {{ {moves} }} }}"
+    start = time.process_time()
+    (one,) = [d for d in nsg.check_text(f"sky(); box {{ scale(4); {MIST} }} {balls}") if d.code == "W0406"]
+    assert "as 3 solids more" in one.message
+    assert time.process_time() - start < 2
+
+
+def test_the_help_for_a_dense_texture_leads_to_a_scene() -> None:
+    thin = "box {{ scale(1, 0.02, 1); material wood {{ {} }} }}"
+    (only,) = nsg.check_text(thin.format(""))
+    assert only.code == "W0511"
+    assert "`scale` in the material's block" in (only.help or "")
+    assert [*nsg.check_text(thin.format("scale(1, 50);"))] == []

@@ -20,7 +20,7 @@ from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.words import COMBINE
 
 SOLIDS = load_manifest("solids3d")
-CHECKS = {"check_eye", "check_levels", "check_seen", "check_trained"}
+CHECKS = {"check_eye", "check_levels", "check_media", "check_seen", "check_trained"}
 
 
 def random_transform(rng: random.Random) -> schema.Transform:

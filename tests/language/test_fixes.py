@@ -240,8 +240,7 @@ def test_most_kinds_of_mistakes_that_can_be_mended_are() -> None:
     assert mended == {
         *("E0102", "E0107", "E0111", "E0114", "E0116", "E0117", "E0119"),
         *("E0123", "E0126", "E0127", "E0130", "E0132", "E0133", "W0101"),
-        *("E0201", "E0204", "E0206", "E0208", "W0201"),
-        *("E0302", "E0334", "E0335"),
+        *("E0302", "E0334", "E0335", "W0201"),
     }
 
 
@@ -320,7 +319,7 @@ def test_fixes_of_slips_bring_the_scene_back_or_leave_an_error() -> None:
             if not any(d.severity == "error" for _, d in done.left):
                 mended += 1
                 wrong += [slip] if read(done.texts["one"]) != scene else []
-    assert mended > 50
+    assert mended > 35
     assert len(wrong) < mended / 20, wrong
 
 

@@ -16,10 +16,9 @@ import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
 from scenelang.drawing.exact.solid import ExactField as Solid
 from scenelang.drawing.render import exact_graph
-from scenelang.language import library
+from scenelang.language import foreign, library
 from scenelang.language.diagnostics import SourceFile, apply_fixes
 from scenelang.language.evaluation import Source
-from scenelang.language.foreign import SHAPES
 from tests.drawing import oracle
 
 Field = Callable[[float, float], float]
@@ -259,11 +258,18 @@ def test_mistakes_in_calls_are_shown_at_the_call() -> None:
             with pytest.raises(nsg.SceneError):
                 compile_scene(scene, spans=spans, diagnostics=found)
         assert [(d.code, d.span and d.span.text) for d in found] == [(code, where)], list(found)
+        (only,) = found
+        assert only.message.startswith(f"the arguments of `{where}` do not fit: ") == (code != "E0409")
+        assert not any(library.holds(label.span.source) for label in only.labels)
 
 
 def test_known_shapes_lead_to_the_library() -> None:
-    text = (library.find(library.SHAPES) or Path()).read_text("utf-8")
-    assert [call for call in SHAPES.values() if f"\nmodule {call.partition('(')[0]}(" not in text] == []
+    for file, shapes in ((library.SHAPES, foreign.SHAPES), (library.SOLIDS, foreign.SOLIDS)):
+        text = (library.find(file) or Path()).read_text("utf-8")
+        for call in shapes.values():
+            assert f"\nmodule {call.partition('(')[0]}(" in text, call
+    modules = set(re.findall(r"^module (\w+)\(", text, re.MULTILINE))
+    assert modules == {call.partition("(")[0] for call in foreign.SOLIDS.values()}
     for text, code, help in (
         ("circle { scale(0.5); }", "E0204", "in the plane write disc { scale(r); }"),
         ("Ring(0.2);", "E0204", 'import "std/shapes" as s; then s.'),

@@ -185,6 +185,11 @@ def command(
 
             progress(0.0)
             told += _save(job, path, outputs, prove, redraw, clock, progress)
+            if job.evaluation is not None and job.evaluation.frames > 1 and request.frame is None:
+                count = job.evaluation.frames
+                told.append(
+                    f"note: {job.name}: frame 0 of {count}; `-o NAME.webp` or `frame-%04d.png` has all"
+                )
             if verbose:
                 if job.program is not None and job.program.stage is not None:
                     from scenelang.drawing.work import work_ms
