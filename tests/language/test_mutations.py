@@ -14,7 +14,7 @@ EACH = 60
 
 
 def test_one_slip_is_one_diagnostic() -> None:
-    outcomes = study(EACH, seed=1)
+    outcomes = study(EACH, seed=3)
     mistakes = [o for o in outcomes if o.fault != "none"]
     assert share(mistakes, "good") >= 0.92
     assert share(parsed_only(mistakes), "good") >= 0.92
