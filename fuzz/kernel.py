@@ -83,7 +83,7 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
         assert (np.diff(trails.pieces["ray"]) >= 0).all()
     lamp, radius = rng.normal(size=3) * 10.0 ** rng.integers(-1, 2), float(rng.choice([0.0, 0.1, 3.0, 1e9]))
     kernel.cones(tables, lamp.astype(np.float32), radius, p, way)
-    if program.stage is not None and not (tables.scene["media"] or tables.detail.any()):
+    if program.stage is not None and not (tables.scene["media"] or tables.looks.hues > 3):
         stage, lamps = stage_rows(program.stage, gap, tables.looks.glowing)
         stage["eye"], lamps["at"] = p[:, 0], p[:, 1 : 1 + len(lamps)].T
         across = int(rng.choice([1, 20, POINTS]))

@@ -54,7 +54,7 @@ class SolidField:
         self.hues, self.switched, self.sigma = looks.hues, looks.switched, looks.sigma
         self.glowing, self.rough = looks.glowing, looks.rough
         self.edged, self.detail = tables.edged, tables.detail
-        self.textures = bool(self.detail.any())
+        self.textures = self.hues > 3
         self.skinned = self.objects.flagged(SKINNED)
         self.draws = bool(self.objects.flagged(DRAWS).all())  # whether all objects draw
         self.media, self.mixed = (bool(tables.scene[name]) for name in ("media", "mixed"))
