@@ -186,8 +186,8 @@ def fitted(leaf: str, seed: int) -> tuple[NormStart, float]:
 
 
 def plane_weights(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict[str, Any]]:
-    """Tensors and header of weights of the plane with norm units in place of its decoders. Codes stay, so that
-    vectors of Programs do, and so does all else. Weights are the smallest that make the units of the codes.
+    """Tensors and header of weights of the plane with norm units in place of its decoders, the smallest that
+    make them of its codes. These stay, so that vectors of Programs do, and so does all else.
     """
     header, arrays = open_weights(data)
     config = FramedConfig(units=1, hidden=8)

@@ -17,7 +17,7 @@ from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, r
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, texture_of
-from scenelang.drawing.neural.frames import FAR, Floats, Frames, Skins, read_skins
+from scenelang.drawing.neural.frames import FAR, Floats, Frames, read_skins
 from scenelang.drawing.neural.meetings import Interval, Meetings, NestedSlot, Nesting, Shown, nesting, shown
 from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, FramedNetwork
 from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes

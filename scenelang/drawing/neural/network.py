@@ -1,8 +1,9 @@
 """The plane's network, from top to bottom, for parameters of either library.
 
 Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, C' = C + `hidden` + 1, F =
-`features`, S = `state`, G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
-coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over contiguous numbers.
+`features`, S = `state`, G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in
+world units, leaf coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over
+contiguous numbers.
 
 The frame gives a point's leaf coordinates exactly (`frames.py`). Two learned parts then draw:
 
@@ -192,8 +193,8 @@ class Slopes:
 
         |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s
 
-    with s by place and radius, ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, infinite
-    where nothing is known, and ``far``, by how much faster f may change where points may lie beyond `RADIUS`.
+    with s by place and radius, ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, and
+    ``far``, by how much faster f may change where points may lie beyond `RADIUS`.
     """
 
     def __init__(self, slack: npt.NDArray[Any], far: float) -> None:

@@ -116,7 +116,9 @@ class LeafUnits:
         d, least, most = (
             reduce(np.maximum, own[1:] or [0 * radius]) + deep - taken
             for own, deep, taken in (
-                (middle, depth[1], middle[0]), (low, depth[0], high[0]), (high, depth[2], low[0])
+                (middle, depth[1], middle[0]),
+                (low, depth[0], high[0]),
+                (high, depth[2], low[0]),
             )
         )
         result: Floats = np.maximum(most - d, d - least)
