@@ -65,7 +65,7 @@ def test_no_point_breaks_the_rise_of_a_shipped_geometry(index: int) -> None:
     p, radius, _ = discs(rng, 10_000)  # away from outlines it is that of a true distance, or little more
     share = (decoder.rise(p, radius) / radius)[abs(decoder.distance(p)) > 1.5 * radius]
     assert np.mean(share) < 1.02
-    assert share.max() < 1.5
+    assert share.max() < 1.6
 
 
 def test_a_rise_holds_for_units_of_any_kind() -> None:
