@@ -206,7 +206,7 @@ def plane_weights(data: bytes) -> tuple[dict[str, npt.NDArray[np.float32]], dict
     names = parameter_shapes(config, *map(len, (codes, arrays["material_codes"])))
     errors = dict(zip(leaves, (error for _, error in ends), strict=True))
     told = {"config": {**header["config"], "network": asdict(config)}, "decoders": {"errors": errors}}
-    return {name: made.get(name, arrays.get(name)).astype(np.float32) for name in names}, {**header, **told}
+    return {name: {**arrays, **made}[name].astype(np.float32) for name in names}, {**header, **told}
 
 
 if __name__ == "__main__":
