@@ -77,7 +77,8 @@ def plus_minus(found: Mapping[str, float], digits: int) -> str:
 def decoders(sizes: Mapping[str, int]) -> str:
     """Layers of a network's decoders by the sizes in its weights."""
     if "segment" not in sizes:
-        return f"{plane.FEATURES} features, {LINES * (sizes['units'] + 2)} lines, {sizes['units'] + 1} norms, 1"
+        units = sizes["units"]
+        return f"{plane.FEATURES} features, {LINES * (units + 2)} lines, {units + 1} norms, 1"
     own = f"{FEATURES} features, {LINES * (sizes['units'] + 1)} lines, {sizes['units']} norms, 1"
     return f"{own}; ways 5, {sizes['segment']}, {sizes['segment']}, 1"
 
