@@ -5,9 +5,8 @@
 A line of JSON for each set, and all of them in a record: means of the share of pixels proved right to
 1/255, of those that are, and of those drawn again; the largest bound and difference from the exact picture;
 and how many pixels are farther from it than their bound, before and after they were drawn again. Of processor
-time of one thread, medians of ratios to a plain frame: of a proof, of what drawing again adds to it, of the
-exact field with regions ruled out alike, and of the reference. Of each the least of three counts, in turn;
-the reference is drawn once.
+time of one thread, medians of ratios to a plain frame: of a proof, of what drawing again adds to it, and of
+the reference. Of each the least of three counts, in turn; the reference is drawn once.
 Exits with 1 if a pixel breaks its proof.
 """
 
@@ -31,18 +30,10 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.how import keep_memory
 from scenelang.drawing.image import PROVED
-from scenelang.drawing.neural.meetings import Interval
-from scenelang.drawing.proof import Band, Stream, known_errors, prove_image
+from scenelang.drawing.proof import prove_image
 from scenelang.drawing.small import draw_small
 
 ROUNDS = 3
-
-
-class ExactStream(Stream):
-    """Exact distances in place of learned ones, also of regions."""
-
-    def distance(self, which: Any, q: Any, exactly: bool) -> Interval:
-        return super().distance(which, q, True)
 
 
 def timed(function: Callable[[], Any]) -> tuple[float, Any]:
@@ -65,16 +56,10 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
     scene, graphs = sets_of(manifest)[name](np.random.default_rng([seed, index])), dict[str, Graph]()
     program = compile_scene(scene, model=manifest.name, after=graphs.__setitem__)
     given = graphs["lower"], graphs["flatten"], manifest
-    canvas = scene.canvas
-
-    def exact() -> Band:
-        return Band(ExactStream(*given, known_errors(manifest)), canvas, range(canvas[1]), np.zeros(4))
-
     ways: dict[str, Callable[[], Any]] = {
         "frame": lambda: draw_small(program).image,
         "proof": lambda: prove_image(*given, image),
         "both": lambda: prove_image(*given, image, redraw=True),
-        "exact": exact,
     }
     image = ways["frame"]()
     times: dict[str, list[float]] = {way: [] for way in ways}
@@ -98,7 +83,6 @@ def measured(name: str, index: int, seed: int) -> dict[str, float]:
         "broken": (off > proof.bound).sum() + (mended > whole.bound).sum(),
         "x_proof": least["proof"] / least["frame"],
         "x_redraw": (least["both"] - least["proof"]) / least["frame"],
-        "x_exact": least["exact"] / least["frame"],
         "x_reference": reference_s / least["frame"],
     }
 

@@ -42,15 +42,14 @@ def viewer(found: Any) -> str:
 
 def proof(found: Any) -> str:
     """Proved shares of the pictures of each set, and their cost."""
-    heads = ("set", "proved, %", "right, %", "largest bound", "largest error")
-    heads += ("proof", "drawn again", "exact field")
+    heads = ("set", "proved, %", "right, %", "largest bound", "largest error", "proof", "drawn again")
     rows = []
     for row in found["sets"]:
         shares = [
             f"{100 * row['proved']:.2f} ± {100 * row['proved_interval']:.2f}",
             f"{100 * row['right']:.2f}",
         ]
-        costs = [f"{row[f'x_{way}']:.1f}" for way in ("proof", "redraw", "exact")]
+        costs = [f"{row[f'x_{way}']:.1f}" for way in ("proof", "redraw")]
         largest = [f"{row[key]:.2f}" for key in ("bound", "off")]
         rows.append([f"`{row['set']}`", *shares, *largest, *costs])
     return markdown(heads, rows)

@@ -8,6 +8,7 @@ from lab import RESULTS
 from lab.docs import solid_rivals
 from lab.docs.figures import kilobytes, numbers, read, told
 from lab.docs.tables import markdown
+from scenelang.drawing.neural import units as plane
 from scenelang.drawing.solid.norms import FEATURES, LINES
 
 PLANE = (
@@ -17,7 +18,6 @@ PLANE = (
     "exact field, nothing skipped, four samples",
     "shapes2d, one sample",
     "exact field, one sample",
-    "shapes2d-w8",
     "Skia",
     "exact reference, 4 spp",
     "the paper's streaming, 256²",
@@ -76,8 +76,10 @@ def plus_minus(found: Mapping[str, float], digits: int) -> str:
 
 def decoders(sizes: Mapping[str, int]) -> str:
     """Layers of a network's decoders by the sizes in its weights."""
-    if "units" not in sizes:
-        return f"2, {sizes['decoder_width']}, {sizes['decoder_width']}, 1"
+    if "segment" not in sizes:
+        return (
+            f"{plane.FEATURES} features, {LINES * (sizes['units'] + 2)} lines, {sizes['units'] + 1} norms, 1"
+        )
     return f"{FEATURES} features, {LINES * (sizes['units'] + 1)} lines, {sizes['units']} norms, 1"
 
 

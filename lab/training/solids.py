@@ -20,7 +20,7 @@ from lab.about import revision
 from lab.training.checkpoint import check_config, load_tensors, save_tensors
 from lab.training.config import SolidsConfig
 from lab.training.loop import Report, schedule
-from lab.training.norms import SIZES, fitted
+from lab.training.norms import fitted
 from scenelang.assets.files import write_whole
 from scenelang.drawing.exact.field import combine
 from scenelang.drawing.neural.load import Solids
@@ -149,7 +149,7 @@ def train_solids(
     network = Solids(config.network, len(LEAVES), len(MATERIALS))
     parts: list[tuple[int, Callable[[int, torch.Generator], dict[str, float]]]] = [
         (config.cell, lambda steps, g: {"cell": fit_cell(network, steps, g)}),
-        (len(SIZES), lambda _, g: fit_leaves(network, config.seed, g)),
+        (len(LEAVES), lambda _, g: fit_leaves(network, config.seed, g)),
     ]
     reached: dict[str, float] = {}  # the errors and losses of parts
     done, spent_s = 0, 0.0

@@ -11,7 +11,7 @@ from scenelang.assets.files import note_input, read_json
 from scenelang.language.words import REFLECTING
 
 ROOT = Path(__file__).parent / "models"
-ALIASES: Final = {"textures2d": "shapes2d"}
+ALIASES: Final = dict.fromkeys(("textures2d", "shapes2d-w16", "shapes2d-w8"), "shapes2d")
 """Earlier names of models, which scenes, Programs and commands may go on to use."""
 USUAL: Final = {2: "shapes2d", 3: "solids3d"}
 """The model of scenes of a dimension that name none."""

@@ -124,7 +124,6 @@ _SUBJECTS = {
     "thickness": ("W0506", "{name}, {value} thick,"),
     "wall": ("W0506", "{name}, {value} thick,"),
     "texels": ("W0511", "a texture of {value} texels to a pixel on {name}"),
-    "level": ("W0513", "an edge of {name} at {value} from that of its leaf"),
 }
 """Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
@@ -345,8 +344,6 @@ def _measures(leaf: Leaf, space: Space) -> Measures:
         least = skin.shell or (row.thickness if row else inf)
         even = skin.shell or leaf.geometry in ("box", "cylinder")  # as thick all over
         result.append(("wall" if even else "thickness", smallest * (least + 2 * grown)))
-    if skin.grow or skin.shell:
-        result += [("level", level) for level in (skin.level, skin.inner) if level is not None]
     for step in leaf.steps:
         if isinstance(step, steps.Warp):
             if step.twirl:

@@ -14,12 +14,13 @@ import numpy as np
 from scenelang.compiler.geometries import GEOMETRIES, SECTORS
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.manifest import load_manifest
-from scenelang.drawing.arrays import Array
+from scenelang.drawing.arrays import NUMPY, Array
 from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import Floats, FramedArrays, FramedConfig
+from scenelang.drawing.neural.units import sector
 from scenelang.drawing.solid.network import Formula, SolidArrays, SolidCell
 
 if TYPE_CHECKING:
@@ -50,28 +51,18 @@ class ExactSectors(ExactShape):
 
     def __init__(self, geometry: str) -> None:
         super().__init__(geometry)
-        n, phase, outer, inner = SECTORS[geometry]
+        self._order, phase, outer, inner = SECTORS[geometry]
         self._first = math.cos(phase), math.sin(phase)
-        self._mirrors: list[tuple[float, float, bool]] = []
-        sector, most = math.pi / n, n  # angles lie in [0, most sectors]
-        while most > 1:
-            at = -(-most // 3)
-            self._mirrors.append((math.cos(at * sector), math.sin(at * sector), 2 * at < most))
-            most = at
-        u, v = inner * math.cos(sector) - outer, inner * math.sin(sector)
+        half = math.pi / self._order
+        u, v = inner * math.cos(half) - outer, inner * math.sin(half)
         self._outer, self._length = outer, math.hypot(u, v)
         self._along = u / self._length, v / self._length
 
     def distance(self, q: Array) -> Array:
         cos, sin = self._first
         x, y = q
-        u, v = cos * x + sin * y, abs(cos * y - sin * x)
-        for cos, sin, beyond in self._mirrors:
-            past = np.maximum(cos * v - sin * u, 0.0)
-            u += 2 * sin * past
-            v -= 2 * cos * past
-            v = abs(v) if beyond else v
-        u -= self._outer
+        u, v = sector(NUMPY, cos * x + sin * y, abs(cos * y - sin * x), self._order)
+        u = u - self._outer
         cos, sin = self._along
         off, gap = sin * u - cos * v, cos * u + sin * v
         gap -= gap.clip(0.0, self._length)
@@ -86,8 +77,7 @@ class ClosedPlane(FramedArrays):
         names = load_manifest(model).geometries
         shapes = [(ExactSectors if name in SECTORS else ExactShape)(name) for name in names]
         self.config = FramedConfig(self.config.code, self.config.material_code)
-        self.slopes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
-        self.levels = dict  # nothing is to be corrected
+        self.shapes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
         self.read_slope = np.float32(math.log(4 * SHARP))
         # a gate is a clamped line: 0.5 where both sides are equal, and open after 1 / (2 slope) world units
         s, k = SHARP, 0.5 / BLEND
@@ -106,7 +96,7 @@ class ClosedPlane(FramedArrays):
         self.bump = np.array([0.0, BLEND, 0.0, 0.0], np.float32)[:, None]
 
     def decoders(self, codes: Array) -> list[Any]:
-        return [self.slopes.get(code.tobytes()) for code in codes]  # rows of elements have none
+        return [self.shapes.get(code.tobytes()) for code in codes]  # rows of elements have none
 
     def object_albedo(self, material_code: Array) -> Array:
         return np.ones((len(material_code), 3), np.float32)

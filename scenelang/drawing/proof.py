@@ -1,23 +1,17 @@
 """Bounds, proved pixel by pixel, of how far a picture of the plane may differ from the exact one.
 
-A region of the picture has a distance to each object: the exact one at its centre, enclosed in an interval,
-widened by the region's radius in the leaf's own coordinates. Intervals pass through the exact fold, whose
-state is monotonic in both distances. Where the result is one colour, all samples of the region have it.
+A region of the picture has a distance to each object: the exact one at its centre, widened by the region's
+radius in the leaf's own coordinates. Intervals pass through the exact fold, whose state is monotonic in both
+distances. Where the result is one colour, all samples of the region have it.
 Elsewhere objects that are certain to change nothing are dropped, and the region's quarters are asked, down to
 single samples. All bounds are of the scene as written, so that they cover the compiler's passes too.
-
-The exact distance at a centre is the learned one, less an error that `python -m lab.errors` has enclosed for
-each cell of leaf coordinates within `RADIUS`. The network sees farther points at the rim: a leaf lies in the
-unit disc, so from there on its distance grows outwards by 1 per leaf unit at most, and at least by the cosine
-of the largest angle between the ways from the origin and from a point of the disc.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from functools import lru_cache, reduce
+from functools import reduce
 from math import hypot, inf, isqrt, sqrt
-from pathlib import Path
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -38,14 +32,12 @@ from scenelang.compiler.groups import (
     widths_of,
 )
 from scenelang.compiler.lifting import lift_many
-from scenelang.compiler.manifest import Manifest, load_manifest, model_folder
+from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
-from scenelang.drawing.arrays import NUMPY, Layers
 from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
-from scenelang.drawing.neural.files import load_arrays, read_proof
 from scenelang.drawing.neural.frames import Frames
 from scenelang.drawing.neural.meetings import (
     Index,
@@ -61,7 +53,6 @@ from scenelang.drawing.neural.meetings import (
     nesting,
     raster,
 )
-from scenelang.drawing.neural.network import RADIUS, FramedNetwork
 from scenelang.language.words import TOKENS
 
 TAME = 1e-9  # leaf units: an error that is allowed for in any case
@@ -260,57 +251,6 @@ def _blend(big: Floats, d: Floats, k: Floats) -> tuple[Floats, Floats]:
     return h, big * (1 - h) + d * h - k * h * (1 - h)
 
 
-CELLS = 128  # along a side of [-RADIUS, RADIUS]
-PROVER = "shapes2d"
-"""The model whose distances are proved. It has every leaf of the plane; they tell of any model's pictures."""
-_SLOWEST = (1 - RADIUS**-2) ** 0.5  # the cosine of the largest angle, whose sine is 1 / RADIUS
-_CHUNK = 2048  # points that go through a decoder at once
-
-
-class Errors:
-    """Bounds (CELLS, CELLS) of a leaf's learned less exact distance, leaf units, rows from the least y up."""
-
-    def __init__(self, layers: Layers, low: npt.NDArray[Any], high: npt.NDArray[Any]) -> None:
-        self._layers = layers
-        self._low, self._high = (np.asarray(side, np.float64) for side in (low, high))
-
-    def exact(self, q: Floats) -> Interval:
-        """The exact distance (M,) at leaf coordinates (2, M), leaf units, by the learned one."""
-        length = np.sqrt(q[0] * q[0] + q[1] * q[1])
-        beyond = np.maximum(length - RADIUS, 0.0)
-        seen = q * (RADIUS / np.maximum(length, RADIUS))
-        parts = [seen[:, at : at + _CHUNK] for at in range(0, seen.shape[1], _CHUNK)]
-        learned = np.concatenate([NUMPY.perceptron(part, self._layers)[0] for part in parts])
-        x, y = ((seen + RADIUS) * (CELLS / (2 * RADIUS))).astype(np.intp).clip(0, CELLS - 1)
-        return Interval(learned - self._high[y, x] + _SLOWEST * beyond, learned - self._low[y, x] + beyond)
-
-
-def errors_path(name: str) -> Path:
-    """Path of the file of a shipped model."""
-    return model_folder(name) / "errors.safetensors"
-
-
-@lru_cache(maxsize=4)
-def load_errors(name: str = PROVER) -> dict[str, Errors]:
-    """By geometry; none where the file is missing or of other weights. Raises `ModelError` if damaged."""
-    network, digest = load_arrays(name)
-    assert isinstance(network, FramedNetwork)
-    names = load_manifest(name).geometries
-    shape = len(names), CELLS, CELLS
-    arrays = read_proof(errors_path(name), {"weights": digest}, {"low": shape, "high": shape})
-    if arrays is None:
-        return {}
-    rows = zip(names, arrays["low"], arrays["high"], strict=True)
-    return {name: Errors(layers_of(network, at), *ends) for at, (name, *ends) in enumerate(rows)}
-
-
-def layers_of(network: FramedNetwork, geometry: int) -> Layers:
-    """The decoder of a geometry in float64, so that every machine computes the same distances."""
-    one = np.append(network.codes[geometry].astype(np.float64), 1.0)
-    parts = zip(network.decoder_w, network.decoder_b, strict=True)
-    return [(np.tensordot(one, w.astype(np.float64), 1).T, one @ b.astype(np.float64)) for w, b in parts]
-
-
 class Stream:
     """The N objects of a scene as written, ``lowered``, and of its stream of leaves, ``graph``.
 
@@ -322,7 +262,7 @@ class Stream:
     nothing else is known of them.
     """
 
-    def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest, known: dict[str, Errors]) -> None:
+    def __init__(self, lowered: Graph, graph: Graph, manifest: Manifest) -> None:
         rows = graph.rows()
         self._leaves = [row.leaf for row in rows]
         levels = [split_levels(leaf.steps, manifest.limits, PLANE) for leaf in self._leaves]
@@ -352,8 +292,7 @@ class Stream:
         # what follows a group follows its first row, and the group's own blend does
         self.group_joins = Joins(groups.joins, widths[first], free[first])
         names = [leaf.geometry for leaf in self._leaves]
-        self._known = {name: errors for name, errors in known.items() if name not in graph.elements}
-        self.unknown = tuple(sorted(set(names) - self._known.keys()))
+        self.unknown = tuple(sorted(set(names) & graph.elements.keys()))
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
         opacity = np.array([leaf.look.opacity for leaf in self._leaves])
@@ -368,8 +307,8 @@ class Stream:
         sides = np.where(every, 2 * half, np.fmin(high, half) - np.fmax(low, -half)).clip(0.0) / (2 * half)
         return float((sides[0] * sides[1]).sum())
 
-    def distance(self, which: Index, q: Floats, exactly: bool) -> Interval:
-        """Distances (P,) of objects (P,) at leaf coordinates (2, P), by learned distances or ``exactly``."""
+    def distance(self, which: Index, q: Floats) -> Interval:
+        """Distances (P,) of objects (P,) at leaf coordinates (2, P)."""
         low, high = np.full(len(which), -NOTHING), np.full(len(which), NOTHING)
         finite = np.isfinite(q).all(0)
         for name, own in self._shapes.items():
@@ -380,10 +319,8 @@ class Stream:
             if name in self.unknown:
                 length = np.hypot(*p)
                 result = Interval(length - 1, length + 1)
-            elif exactly:
-                result = Interval(*[leaf_distance(name, p)] * 2)
             else:
-                result = self._known[name].exact(p)
+                result = Interval(*[leaf_distance(name, p)] * 2)
             low[some], high[some] = result
         bare = Interval(low, high)
         return _worn(bare, *self._skins[:, which]) if self._skins.any() else bare
@@ -449,17 +386,9 @@ class Band:
             pairs = pairs.take(~done[pairs.block])
             if side > along:
                 pairs = pairs.split(grid.wide // side, 2)
-        self._pixels = pairs  # pixels that are drawn by their samples
-        self._sampled(exactly=False)
+        self._sampled(pairs)
 
-    def draw(self, wanted: Mask) -> None:
-        """Ask for pixels (rows, width) by exact distances, among those that are told by their samples."""
-        every = np.zeros(self._every.shape[1:3], bool)
-        every[: wanted.shape[0], : wanted.shape[1]] = wanted
-        self._pixels = self._pixels.take(every.ravel()[self._pixels.block])
-        self._sampled(exactly=True)
-
-    def _looked(self, pairs: Pairs, side: int, exactly: bool = False) -> tuple[Index, Interval, Pairs]:
+    def _looked(self, pairs: Pairs, side: int) -> tuple[Index, Interval, Pairs]:
         """Regions, what they show (K, B), and the pairs that have to be asked again."""
         stream, grid = self._stream, self._grid
         place, half = np.stack(grid.place(pairs.block, side)), (side - 1) / 2
@@ -472,7 +401,7 @@ class Band:
         meetings, source = meetings_of(pairs)
         thing, some = meetings.pairs.object, some[source]
         q, radius, scale = q[:, some], radius[some], stream.frames.scale[thing]
-        exact, colour = stream.distance(thing, q, exactly), stream.colour(thing, q, side == 1)
+        exact, colour = stream.distance(thing, q), stream.colour(thing, q, side == 1)
         # what is not a number bounds nothing
         low = np.fmax((exact.low - radius) * scale, -NOTHING)
         world_distance = Interval(low, np.fmin((exact.high + radius) * scale, NOTHING))
@@ -486,15 +415,15 @@ class Band:
         changing[source] = left
         return meetings.columns, shown, pairs.take(changing)
 
-    def _sampled(self, *, exactly: bool) -> None:
+    def _sampled(self, pixels: Pairs) -> None:
         """Ask for the samples of pixels that they have to tell, and take their means."""
         along = self._along
         wide = self._grid.wide // along
-        columns, shown, _ = self._looked(self._pixels.split(wide, along), 1, exactly)
+        columns, shown, _ = self._looked(pixels.split(wide, along), 1)
         x, y = self._grid.place(columns, 1)
         for every, values in zip(self._every, shown, strict=True):
             flat = every.reshape(-1, len(self._behind))
-            flat[self._pixels.block] = self._behind
+            flat[pixels.block] = self._behind
             np.add.at(flat, y // along * wide + x // along, (values.T - self._behind) / along**2)
 
 
@@ -509,11 +438,10 @@ def prove_image(
     """Prove by how much each pixel of an image, whoever drew it, differs from the exact one at most: the
     picture and its proof, from the scene as written and its stream of leaves.
 
-    If ``redraw``, pixels not proved right to `PROVED` are drawn again, by exact distances where bounds are
-    not enough. Raises `RenderError` where the model is not of the plane, learned more than distances, or a
-    file is missing, `ModelError` where one is damaged.
+    If ``redraw``, pixels not proved right to `PROVED` are drawn again. Raises as `check_proved`.
     """
-    stream = Stream(lowered, graph, manifest, known_errors(manifest))
+    check_proved(manifest)
+    stream = Stream(lowered, graph, manifest)
     (width, height), behind = graph.canvas, np.zeros(4)
     if graph.background is not None:
         behind = np.asarray(graph.background, np.float64)
@@ -530,7 +458,6 @@ def prove_image(
         drawn = picture[part.start : part.stop]
         result = _off(drawn, band.shown)
         if redraw and (bad := result > PROVED).any():
-            band.draw(bad & (_off(band.shown.low, band.shown) > PROVED))
             middle = (band.shown.low + band.shown.high) / 2
             bad &= _off(middle, band.shown) <= PROVED  # what stays open stays as it was drawn
             drawn[bad] = middle[bad]
@@ -551,12 +478,9 @@ def _off(drawn: Floats, shown: Interval) -> Floats:
     return worst + ROUNDING
 
 
-def known_errors(manifest: Manifest) -> dict[str, Errors]:
-    """Proved errors of the distances of geometries; raises as `prove_image`."""
+def check_proved(manifest: Manifest) -> None:
+    """Raise `RenderError` for a model that is not of the plane, or that learned where points lie."""
     if manifest.dimension != 2:
         raise RenderError("pictures of solids are not proved, those of the plane are")
     if not manifest.framed:
         raise RenderError(f"pictures of `{manifest.name}` are not proved, as it learned where points lie too")
-    if not (known := load_errors()):
-        raise RenderError(f"no proof comes with these weights of `{PROVER}`")
-    return known

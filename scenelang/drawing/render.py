@@ -204,16 +204,12 @@ def prove_drawn(
     The stream that is proved has all objects, so that no pass that drops some has to be believed.
     """
     from scenelang.compiler.manifest import load_manifest
-    from scenelang.compiler.weights import ModelError
-    from scenelang.drawing.proof import known_errors, prove_image
+    from scenelang.drawing.proof import check_proved, prove_image
 
     keep_memory()
-    try:
-        known_errors(manifest := load_manifest(model))
-        lowered, stream = (how.sampled(graphs[name]) for name in ("lower", "flatten"))
-        return prove_image(lowered, stream, manifest, draw(), redraw=redraw)
-    except ModelError as error:
-        raise RenderError(str(error)) from None
+    check_proved(manifest := load_manifest(model))
+    lowered, stream = (how.sampled(graphs[name]) for name in ("lower", "flatten"))
+    return prove_image(lowered, stream, manifest, draw(), redraw=redraw)
 
 
 def render_outputs(

@@ -62,7 +62,6 @@ def softened(name: str, width: float) -> FramedArrays:
     network = load_arrays(name).network
     assert isinstance(network, FramedArrays)
     soft = copy.copy(network)
-    soft.levels = dict
     cell = Cell(*network.cell_weights())
     unit = float(np.linalg.norm(cell.candidate[UNION, 0]))  # growth of the state per world unit
     # coverage rises from 0 to 1 over 4 / exp(slope) of the state: make that at least the width

@@ -207,20 +207,13 @@ def view_of(
         ],
     }
     if isinstance(network, FramedArrays):
-        data |= plane.shader(network, store, _skinned(data))
+        data |= plane.shader(network, store)
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
         if has_sky(program):
             data["around"] = volume(program, network, store, draft or FULL)
     data["alt"] = alternative(data)
     return PagePayload(data, store.bytes())
-
-
-def _skinned(data: dict[str, Any]) -> set[int]:
-    """The shapes of a view that have a skin, or may get one by its form."""
-    rows, later = data["program"]["rows"], json.dumps(data["form"])
-    late = any(f'"{word}"' in later for word in ("grow", "shell"))
-    return {row["shape"] for row in rows if late or any(row.get("skin", ()))}
 
 
 MOST_TITLE: Final = 200

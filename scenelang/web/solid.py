@@ -118,33 +118,41 @@ def _decoder(layers: Smooth, sloped: bool) -> list[str]:
     return [*lines, *(["g = c0.yzw;"] if sloped else []), "return c0.x;"]
 
 
+def unit_lines(layers: Norms, names: Sequence[str]) -> list[str]:
+    """Statements of levels ``l0`` and so on, cut at zero but inside, by the names of features; of lengths
+    ``u0`` and so on of units, the first of a notch if there is one; of the highest unit and the depth.
+    """
+    levels = [
+        " + ".join([repr(float(b)), *(f"{x} * {v!r}" for x, v in zip(names, row.tolist(), strict=True) if v)])
+        for row, b in zip(layers.w, layers.b, strict=True)
+    ]
+    lines = [f"float l{i} = {level};" for i, level in enumerate(levels)]
+    sizes = (layers.notch, *layers.units) if layers.notch else layers.units
+    lines += [f"l{i} = max(l{i}, 0.0);" for i in range(sum(sizes))]
+    for k, (first, end) in enumerate(pairwise(accumulate(sizes, initial=0))):
+        squares = [f"l{i} * l{i}" for i in range(first, end)]
+        lines.append(f"float u{k} = sqrt({' + '.join(squares)});")
+    lengths = [f"u{k}" for k in range(bool(layers.notch), len(sizes))]
+    lines.append(f"float far = {_highest(lengths) if lengths else '0.0'};")
+    inner = [f"l{i}" for i in range(sum(sizes), len(levels))]
+    return [*lines, f"float deep = {_highest(inner) if inner else '0.0'};"]
+
+
 def _norms(layers: Norms, sloped: bool) -> list[str]:
     """Statements that return the answer of norm units, as `norms.answers`."""
     names = ("s.x", "s.y", "s.z", "across", "q.y", "most", "least")
-    used = [names[i] for i in layers.features]
-    levels = [
-        " + ".join([repr(float(b)), *(f"{x} * {v!r}" for x, v in zip(used, row.tolist(), strict=True) if v)])
-        for row, b in zip(layers.w, layers.b, strict=True)
-    ]
     lines = [
         "vec3 s = abs(q);",
         "float across = length(q.xz), most = max(max(s.x, s.y), s.z), least = min(min(s.x, s.y), s.z);",
-        *(f"float l{i} = {level};" for i, level in enumerate(levels)),
+        *unit_lines(layers, [names[i] for i in layers.features]),
     ]
-    outer, ends = sum(layers.units), [*pairwise(accumulate(layers.units, initial=0))]
-    lines += [f"l{i} = max(l{i}, 0.0);" for i in range(outer)]
-    for k, (first, end) in enumerate(ends):
-        squares = [f"l{i} * l{i}" for i in range(first, end)]
-        lines.append(f"float u{k} = sqrt({' + '.join(squares)});")
-    lengths = [f"u{k}" for k in range(len(ends))]
-    lines.append(f"float far = {_highest(lengths) if lengths else '0.0'};")
-    inner = [f"l{i}" for i in range(outer, len(levels))]
-    lines.append(f"float deep = {_highest(inner) if inner else '0.0'};")
     if sloped:
         lines.append("vec3 a = vec3(0.0); float about = 0.0, up = 0.0, top = 0.0, low = 0.0;")
         places = ("a.x", "a.y", "a.z", "about", "up", "top", "low")
-        units = ((k, i) for k, (first, end) in enumerate(ends) for i in range(first, end))
+        ends = enumerate(pairwise(accumulate(layers.units, initial=0)))
+        units = ((k, i) for k, (first, end) in ends for i in range(first, end))
         rates = [f"u{k} == far ? l{i} / max(far, 1e-18) : 0.0" for k, i in units]
+        inner = (f"l{i}" for i in range(sum(layers.units), len(layers.b)))
         rates += [f"(deep < 0.0 || far == 0.0) && {name} == deep ? 1.0 : 0.0" for name in inner]
         for rate, row in zip(rates, layers.w.tolist(), strict=True):
             terms = [f"{places[i]} += r * {v!r};" for i, v in zip(layers.features, row, strict=True) if v]

@@ -122,7 +122,7 @@ OF_THE_NETWORK = {
     "a network without a size": network(decoder_width=None),
     "a network of no size": network(decoder_width=0),
     "a network of negative size": network(features=-1),
-    "a network of a huge decoder": network(decoder_width=1024),
+    "a network of a huge decoder": network(units=1024),
     "a network of a huge cell": network(features=1024, state=1024),
     "a network of true size": network(state=True),
     "a network with a size unknown": network(depth=3),

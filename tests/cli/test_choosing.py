@@ -122,7 +122,7 @@ def test_a_missing_or_damaged_frontier(shipped: Folder) -> None:
 
 def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.MonkeyPatch) -> None:
     """Compiled again for it; refused where it warns or errs and the scene's own model does not."""
-    other = "shapes2d-w8"
+    other = "shapes2d-reading"
     points = [point(other, 5, 0.02, model=other), point("shapes2d", 16, 0.003)]
     (shipped.path / "shipped.json").write_text(frontier(*points).to_json(), "utf-8")
     text = said(shipped, "--max-flip 0.05")

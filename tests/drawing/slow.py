@@ -31,13 +31,21 @@ class Slow:
 
     def distance(self, code: Array, q: Array) -> Array:
         """What the decoder answers at leaf coordinates (P, 2)."""
-        radius = np.hypot(q[:, 0], q[:, 1])
-        x = q * (2 / np.maximum(radius, 2))[:, None]
-        for i in range(3):
-            weight = np.tensordot(np.append(code, 1), self.w[f"decoder_w.{i}"], 1)
-            x = x @ weight + np.append(code, 1) @ self.w[f"decoder_b.{i}"]
-            x = np.maximum(x, 0) if i < 2 else x
-        return x[:, 0] + np.maximum(radius - 2, 0) * self.w["far"]
+        hidden = np.maximum(code @ self.w["lift_w"] + self.w["lift_b"], 0)
+        one = np.concatenate([code, hidden, [1]])
+        lines, r = np.tensordot(one, self.w["lines"], 1), one @ self.w["radius"]
+        result = []
+        for x, y in q:
+            radius, features = math.hypot(x, y), [math.hypot(x, y), abs(x), abs(y), y]
+            for n in (3, 5, 6):  # the angle to the nearest of n directions, the first of which is +y
+                turn = math.tau / n
+                angle = abs((math.atan2(x, y) + turn / 2) % turn - turn / 2)
+                features += [radius * math.cos(angle), radius * math.sin(angle)]
+            levels = lines @ [*features, 1]
+            notch, *units, inner = levels.reshape(-1, 3)
+            length = max(np.linalg.norm(np.maximum(unit, 0)) for unit in units)
+            result.append(length + min(max(inner), 0) - np.linalg.norm(np.maximum(notch, 0)) - r)
+        return np.array(result)
 
     def colour(self, m: Array) -> Array:
         """The colour (3,) that a material vector (32,) shows."""

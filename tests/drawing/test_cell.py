@@ -82,7 +82,7 @@ def test_a_shut_gate_is_shut_and_asks_for_nothing() -> None:
 
 @pytest.fixture(scope="module")
 def model() -> Model:
-    return load_model("shapes2d")
+    return load_model("shapes2d", weights="bb3fe72417a92d611df31e12529f9ca7527d73717b8b521820ddc1520656629b")
 
 
 def programs(name: str, count: int, canvas: tuple[int, int] = (64, 64)) -> list[Program]:
@@ -95,7 +95,7 @@ def programs(name: str, count: int, canvas: tuple[int, int] = (64, 64)) -> list[
 
 def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
     """The inference path (channels first, folded weights, skipping off) against `Trainee.trace`."""
-    network = Trainee(model.framed.config, len(model.manifest.geometries), 1).requires_grad_(False)
+    network = Trainee(FramedConfig(), len(model.manifest.geometries), 1).requires_grad_(False)
     network.load_state_dict(model.network.state_dict())
     for program in programs("chains", 4):
         field, count = Field(network, program.vectors, program.tokens), len(program)

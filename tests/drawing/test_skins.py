@@ -6,13 +6,11 @@ import numpy as np
 import pytest
 
 import scenelang as nsg
-from scenelang.compiler.geometries import GEOMETRIES
-from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import ProgramError, parse_program, program_bytes
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.assets import GrownShape
 from scenelang.drawing.neural.field import Field
-from scenelang.drawing.neural.files import load_arrays, load_levels
+from scenelang.drawing.neural.files import load_arrays
 from tests.pictures import psnr_db
 
 LOOK = "material flat { color(#222); }"
@@ -124,21 +122,6 @@ def test_damaged_skins_are_refused(place: str, value: float) -> None:
     vectors[0, getattr(network.layout.places, place)] = value
     with pytest.raises(ProgramError, match="beyond"):
         Field(network, vectors, program.tokens)  # type: ignore[arg-type]
-
-
-def test_corrected_distances_are_true_far_from_outlines() -> None:
-    """Of the shipped weights, whose file of corrections is theirs: within a thousandth of a leaf unit."""
-    network, digest = load_arrays("shapes2d")
-    assert len(load_levels("shapes2d", digest)) == len(network.codes)
-    p = np.random.default_rng(2).uniform(-2.4, 2.4, (2, 4000)).astype(np.float32)
-    for name in load_manifest("shapes2d").geometries:
-        program = nsg.compile(nsg.loads(f"nsg 1; {name} {{ grow(0.25); }}"))
-        field = Field(network, program.vectors, program.tokens)  # type: ignore[arg-type]
-        objects = np.zeros(p.shape[1], int)
-        found = field.features(objects, p[:, None], np.ones(p.shape[1], bool))[0, 0] + 0.25
-        exact = GEOMETRIES[name].distance(p.astype(np.float64))
-        outside = (exact > 0) & (exact < 1.5)
-        assert np.sqrt(np.square(found - exact)[outside].mean()) < 1e-3
 
 
 @pytest.mark.parametrize("d", [2, 3])

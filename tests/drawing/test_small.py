@@ -78,8 +78,7 @@ def test_random_scenes_look_the_same() -> None:
 def test_odd_scenes_look_the_same() -> None:
     texts = "", "background(none);", "star { scale(3e9); }", "star { scale(1, 1e-3); rotate(1rad); }"
     for text in (*texts, f"smooth {{ {STAR} {STAR} }}"):
-        for model in ("shapes2d", "shapes2d-w8"):
-            assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text), model=model))
+        assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text)))
 
 
 def test_small_work_is_numpy_s() -> None:

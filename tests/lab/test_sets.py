@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import json
-import math
 import re
 
 import numpy as np
@@ -16,12 +15,10 @@ from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.sets.scenes import coverage, interval, scenes_of, sets_of, spread
 from lab.sets.solids import SOLID_SETS
 from lab.shadows import shadow_mask
-from lab.symmetric import Floats, SymmetricDecoder, hiding, placed
 from scenelang.compiler import spaces
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
 from scenelang.drawing.neural.load import load_model
-from scenelang.drawing.neural.network import RADIUS
 from scenelang.language.scene import Camera, Material, Object, Scale, Scene, Translate
 from scenelang.language.words import OPERATIONS, TEXTURES
 
@@ -67,37 +64,6 @@ def test_a_scene_covers_what_its_objects_do() -> None:
         0.0,
         0.0,
     ]
-
-
-def answered(numbers: list[Floats], p: Floats) -> Floats:
-    """Distances (P,) at points (2, P), unit by unit."""
-    w1, b1, w2, b2, w3, b3 = numbers
-    found: Floats = w3 @ np.maximum(w2 @ np.maximum(w1 @ p + b1[:, None], 0) + b2[:, None], 0) + b3
-    return found[0]
-
-
-def points(count: int) -> Floats:
-    angle, radius = np.random.default_rng(3).uniform(0, 1, (2, count)) * [[math.tau], [RADIUS]]
-    return radius * np.array([np.cos(angle), np.sin(angle)])
-
-
-def test_two_decoders_hide_a_third() -> None:
-    rng, p = np.random.default_rng(2), points(500)
-    a, b, third = (
-        decoder.numbers(decoder.start(rng))
-        for decoder in (
-            SymmetricDecoder(4, ("g", "g1")),
-            SymmetricDecoder(3, ("gg", "ge")),
-            SymmetricDecoder(6, ("v", "e1")),
-        )
-    )
-    one, two = hiding(a, b, third, 32)
-    assert answered(one, p) == pytest.approx(answered(a, p))
-    assert answered(two, p) == pytest.approx(answered(b, p))
-    mixed = [2 * x - y for x, y in zip(one, two, strict=True)]
-    assert answered(mixed, p) == pytest.approx(answered(third, p))
-    alone = placed(third, 32)
-    assert answered(alone, p) == pytest.approx(answered(third, p))
 
 
 def test_the_mask_is_what_the_ball_of_mist_darkens() -> None:

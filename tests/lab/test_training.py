@@ -126,10 +126,12 @@ def test_a_decoder_gets_the_cell_of_a_model(tmp_path: Path) -> None:
     found, _ = load_tensors(tmp_path / "weights.safetensors")
     donor = load_model("shapes2d").framed.state_dict()
     same = {
-        name for name in found if found[name].shape == donor[name].shape and found[name].equal(donor[name])
+        name
+        for name in found.keys() & donor.keys()
+        if found[name].shape == donor[name].shape and found[name].equal(donor[name])
     }
     assert {"cell_lines", "cell_bias", "albedo", "material_codes", "read_slope"} <= same
-    assert not same & {"codes", "far"}
+    assert "codes" not in same
     assert found["decoder_w.1"].shape == (5, 8, 8)
 
 

@@ -87,9 +87,9 @@ def test_the_choice_says_why() -> None:
     assert choice(named, "shapes2d", asked=False)["why"] == "named by the scene"
     assert choice(named, "shapes2d", asked=True)["why"] == "by --model"
     found = choice(free, "shapes2d", asked=False)
-    assert found["runner_up"] == "shapes2d-w16"
+    assert found["runner_up"] == "shapes2d-reading"
     assert found["lacking"]["solids3d"] == ["geometry `star` belongs to flat scenes, and this one is solid"]
-    assert "shapes2d-w8" not in found["lacking"]
+    assert "shapes2d-reading" not in found["lacking"]
 
 
 def test_the_command(tmp_path: Path) -> None:

@@ -14,7 +14,6 @@ GIVEN = dict.fromkeys(
         "m (32 numbers)",
         "frames of 12 numbers",
         "all objects eight times",
-        "a slope of 1.05",
         "looked up, four times where no",
         "up to 0.009 further",
         "at least 0.002",

@@ -136,7 +136,6 @@ GIVEN = {
     "at least 95 % of each": "how a promise is defined",
     "a fixed piece of work of 50 ms": "how the yardstick was made",
     "drawn in 256 pixels": "how a time is foretold",
-    "128 × 128 cells": "the grid of the proof",
     "is at most 25 dB from it": "how targets are made",
     "within 1 % of every range, or a picture at 45 dB": "what counts as found",
     "noise of 2 to 5 %": "how targets are made",

@@ -16,10 +16,10 @@ from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.assets import GridShape, Lattice, Texture, grid_shape, texture_of
-from scenelang.drawing.neural.frames import FAR, Floats, Frames, Skins, read_skins
+from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, texture_of
+from scenelang.drawing.neural.frames import FAR, Floats, Frames, read_skins
 from scenelang.drawing.neural.meetings import Interval, Meetings, NestedSlot, Nesting, Shown, nesting, shown
-from scenelang.drawing.neural.network import EMPTY, EXTENT, RADIUS, Cell, Decoder, FramedNetwork, Slopes
+from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, FramedNetwork
 from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
@@ -118,17 +118,11 @@ class Field:
         self.codes = codes = codes.reshape(len(result), every.shape[1])
         """Codes of the leaves in use (K, C), whose decoders are computed together."""
         learned = network.decoders(xp.array(codes, self.like))
-        self.shapes: list[Decoder | GridShape | OutlineShapes] = [*learned]
-        self.slopes: list[Slopes | None] = [network.slopes.get(code.tobytes()) for code in codes]
+        self.shapes: list[Any] = [*learned]
+        """Decoders, grids and outlines."""
+        self.slopes: list[Any] = [None if isinstance(shape, Decoder) else shape for shape in learned]
+        """What tells for each how far distances differ within a radius, None where nothing is known."""
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
-        self.levels: list[tuple[int, Lattice, float, float]] = []
-        """Corrections of leaves with skins: the leaf's index, how fast they change, and how much at most."""
-        known = {} if self.skins is None else network.levels()
-        for at, code in enumerate(codes):
-            if (grid := known.get(code.tobytes())) is not None:
-                steep = np.hypot(*(abs(np.diff(grid, axis=axis)).max() for axis in (0, 1)))
-                lattice = Lattice(xp, xp.array(grid.reshape(-1), self.like), len(grid), 2)
-                self.levels.append((at, lattice, steep * (len(grid) - 1) / 2 / EXTENT, float(np.ptp(grid))))
         grown = {self.brought[i] for i in more}
         elements = dict.fromkeys(element for element in self.brought if element is not None)
         if elements and network.config.features != 1:
@@ -140,7 +134,7 @@ class Field:
             if element not in outlines:
                 self.shape[[held == element for held in self.brought]] = len(self.shapes)
                 self.shapes.append(grid_shape(element, xp, self.like, element in grown))
-                self.slopes.append(self.shapes[-1].slopes())  # type: ignore[union-attr]
+                self.slopes.append(self.shapes[-1].slopes())
         if outlines:
             self.shape[self.outline >= 0] = len(self.shapes)
             self.shapes.append(OutlineShapes(xp, [*outlines], self.like))
@@ -261,31 +255,19 @@ class Field:
                 xp.put(feature, xp.array(index, q), values)
         assert result is not None
         if self.skins is not None:
-            result = self._skinned(self.skins, objects, q, result)
+            result = self.skins.at(objects).placed(xp, q).put_on(xp, result)
         scale = xp.array(self.frames.scale[objects].astype(np.float32), q)
         result = result.swapaxes(0, 1) * scale
         return result.clip(-FAR, FAR) if self.frames.wild[objects].any() else result
 
-    def _skinned(self, skins: Skins, objects: np.ndarray, q: Array, result: Array) -> Array:
-        """What skins make of leaves' features (F, groups, P), which are corrected first."""
-        xp, shape = self.xp, np.where(self.skinned, self.shape, -1)[objects]
-        for at, lattice, *_ in self.levels:
-            index = np.flatnonzero(shape == at)
-            if len(index):
-                some = xp.array(index, q)
-                place = (xp.take(q, some) * (1 / EXTENT)).clip(-1.0, 1.0)
-                more = lattice.at(place.reshape(2, -1)).reshape(place.shape[1:])
-                xp.put(result[0], some, xp.take(result[0], some) + more)
-        return skins.at(objects).placed(xp, q).put_on(xp, result)
-
-    def _decoded(self, shape: Decoder | GridShape, q: Array, far: bool) -> Array:
+    def _decoded(self, shape: Any, q: Array, far: bool) -> Array:
         """Features (F, M) in leaf units."""
-        if not isinstance(shape, Decoder):
-            return shape.distance(q)[None]
         parts = []
+        if isinstance(shape, GridShape):
+            return shape.distance(q)[None]
         for start in range(0, q.shape[1], CHUNK):
             part = q[:, start : start + CHUNK]
-            radius = self.xp.length(list(part)) if far else None
+            radius = self.xp.length(list(part)) if far and isinstance(shape, Decoder) else None
             parts.append(self.network.decode(part, radius, 1.0, shape))
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
 
@@ -397,9 +379,6 @@ class Field:
             here = np.flatnonzero(shape == at)
             if slopes is not None and len(here):
                 result[here] = slopes.rise(q.take(here, -1), radius[here])
-        for at, _, steep, most in self.levels:
-            here = np.flatnonzero((shape == at) & self.skinned[objects])
-            result[here] += np.minimum(steep * radius[here], most)
         most = np.fmin((result + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
         return np.asarray(most, np.float32)
 

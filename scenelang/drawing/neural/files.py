@@ -1,21 +1,11 @@
-"""Networks out of weights files as numpy arrays, and the proved slopes beside them.
-
-`python -m lab.slopes NAME` proves slopes. Without them every block is drawn pixel by pixel.
-"""
+"""Networks out of weights files as numpy arrays."""
 
 from __future__ import annotations
 
 import hashlib
-from collections.abc import Mapping
-from functools import lru_cache, partial
-from pathlib import Path
+from functools import lru_cache
 from typing import Any, Final, NamedTuple, TypeVar
 
-import numpy as np
-import numpy.typing as npt
-
-from scenelang.assets.files import read_regular
-from scenelang.assets.tensors import TensorError, read_tensors
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.weights import (
     ModelError,
@@ -24,72 +14,15 @@ from scenelang.compiler.weights import (
     open_weights,
     replaced,
     shipped_weights,
-    weights_folder,
 )
-from scenelang.drawing.neural.network import (
-    CELLS,
-    LEVEL_NODES,
-    NODE,
-    RADII,
-    STEEP,
-    FramedArrays,
-    FramedConfig,
-    Slopes,
-    parameter_shapes,
-)
+from scenelang.drawing.neural.network import FramedArrays, FramedConfig, parameter_shapes
+from scenelang.drawing.neural.units import FEATURES
 from scenelang.drawing.solid.network import SolidArrays, SolidConfig, solid_shapes
-
-MOST_BYTES = 1 << 20
-Arrays = dict[str, npt.NDArray[Any]]
-
-
-def slopes_path(name: str, digest: str = "") -> Path:
-    """File of a shipped model's weights, those of today or those `replaced`."""
-    return weights_folder(name, digest) / "slopes.safetensors"
-
-
-def read_proof(path: Path, header: Mapping[str, Any], shapes: Mapping[str, tuple[int, ...]]) -> Arrays | None:
-    """The arrays of a file of proofs; None if missing or of another header, `ModelError` if damaged."""
-    try:
-        result = read_tensors(read_regular(path, MOST_BYTES), MOST_BYTES)
-        arrays = result.arrays()
-    except OSError:
-        return None
-    except TensorError as error:
-        raise ModelError(f"damaged file `{path.name}`: {error}") from None
-    if any(result.header.get(key) != value for key, value in header.items()):
-        return None
-    if {key: value.shape for key, value in arrays.items()} != shapes:
-        raise ModelError(f"damaged file `{path.name}`: not the arrays that it should have")
-    return arrays
-
-
-def load_slopes(name: str, digest: str, codes: npt.NDArray[np.float32], far: float) -> Mapping[bytes, Slopes]:
-    """Slopes by the bytes of codes (geometries, C); none where the file is missing or of other weights."""
-    header = {"weights": digest, "node": NODE, "steep": STEEP}
-    arrays = read_proof(slopes_path(name, digest), header, {"cells": (len(codes), len(RADII), CELLS, CELLS)})
-    if arrays is None:
-        return {}
-    if (arrays["cells"] < 0).any():
-        raise ModelError(f"damaged slopes of `{name}`: negative ones")
-    return {code.tobytes(): Slopes(own, far) for code, own in zip(codes, arrays["cells"], strict=True)}
-
+from scenelang.drawing.solid.norms import LINES
 
 MOST_SIZE: Final = 128  # Most units of a layer for solids: their square, times the code, is 9 MB
 MOST_WIDTH: Final = 1024  # Most units of a layer in the plane
 Config = TypeVar("Config", FramedConfig, SolidConfig)
-
-
-@lru_cache(maxsize=8)
-def load_levels(name: str, digest: str) -> Mapping[bytes, npt.NDArray[np.float32]]:
-    """By the bytes of codes, what leaves' decoders are short of far from their outlines (`LEVEL_NODES`,
-    `LEVEL_NODES`), which leaves that grow and shells show; none where there is no file for these weights.
-    """
-    path, network = weights_folder(name, digest) / "levels.safetensors", load_arrays(name, digest).network
-    shape = len(network.codes), LEVEL_NODES, LEVEL_NODES
-    arrays = read_proof(path, {"weights": digest}, {"levels": shape})
-    rows = () if arrays is None else arrays["levels"].astype(np.float32)
-    return {code.tobytes(): row for code, row in zip(network.codes, rows, strict=False)}
 
 
 def sizes_of(kind: type[Config], config: Any, size: int) -> Config:
@@ -107,6 +40,8 @@ def sizes_of(kind: type[Config], config: Any, size: int) -> Config:
         raise ModelError(f"bad network sizes: {error}") from None
     if isinstance(known, FramedConfig):
         decoder = (known.code + 1) * known.decoder_width * (known.decoder_width + known.features)
+        if known.units:
+            decoder = (known.code + known.hidden + 1) * LINES * (known.units + 2) * FEATURES
         rows = known.state + known.paint_lines
         cell = (known.features + known.state) * rows + known.features * known.state
         if 4 * max(decoder, cell) > size:
@@ -150,7 +85,4 @@ def _load(name: str, weights: str) -> ArrayModel:
     digest = hashlib.sha256(data).hexdigest()
     if manifest.renderer == "solid":
         return ArrayModel(solid_arrays(data, len(manifest.geometries), len(manifest.materials)), digest)
-    network = framed_arrays(data, manifest)
-    network.slopes = load_slopes(name, digest, network.codes, float(network.far[0]))
-    network.levels = partial(load_levels, name, digest)
-    return ArrayModel(network, digest)
+    return ArrayModel(framed_arrays(data, manifest), digest)

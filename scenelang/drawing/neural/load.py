@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -25,7 +24,7 @@ from scenelang.compiler.weights import (
     shipped_weights,
 )
 from scenelang.drawing.arrays_torch import TORCH
-from scenelang.drawing.neural.files import MOST_WIDTH, load_levels, load_slopes, sizes_of
+from scenelang.drawing.neural.files import MOST_WIDTH, sizes_of
 from scenelang.drawing.neural.network import FramedConfig, FramedNetwork, parameter_shapes
 from scenelang.drawing.neural.paper import Reading, ReadingConfig, Streaming, StreamingConfig
 from scenelang.drawing.solid.network import SolidConfig, SolidNetwork, solid_shapes
@@ -166,10 +165,6 @@ def load_model(name: str, device: str = "cpu", path: Path | None = None, weights
     """Load a shipped model, or weights at ``path``; raises and takes ``weights`` as `load_arrays`."""
     manifest, data = manifest_of(name, weights, path), shipped_weights(name, weights, path)
     network, codes = load_network(data, manifest, device), codes_of(manifest, data)
-    if isinstance(network, Framed):
-        host = network.codes.cpu().numpy()
-        network.slopes = load_slopes(name, codes.digest, host, float(network.far[0]))
-        network.levels = partial(load_levels, name, codes.digest)
     return Model(manifest, network, codes, open_weights(data).header)
 
 

@@ -1,48 +1,40 @@
-"""The plane's network, from top to bottom, for parameters of either library, and its proved slopes.
+"""The plane's network, from top to bottom, for parameters of either library.
 
-Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, F = `features`, S = `state`,
-G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in world units, leaf
-coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over contiguous numbers.
+Letters: B streams, N objects, M points, d coordinates of a point, C = `code`, C' = C + `hidden` + 1, F =
+`features`, S = `state`, G = `decoder_width`, L = `paint_lines`, R = numbers in the register. Distances are in
+world units, leaf coordinates in leaf units. Points lie last, (…, channels, M), so that arithmetic runs over
+contiguous numbers.
 
 The frame gives a point's leaf coordinates exactly (`frames.py`). Two learned parts then draw:
 
 1. The decoder turns leaf coordinates into F distance-like features. Its weights are a linear function of
-   the object's code, so that shapes live in codes. It has rectified linear units, which represent straight
-   edges exactly, and its output is multiplied by the object's distance scale.
+   the object's code, behind a hidden layer, so that shapes live in codes. Its units are norms (`units.py`),
+   or, in networks of before, rectified linear. Its output is multiplied by the object's distance scale.
 2. The cell is an LSTM (Hochreiter and Schmidhuber 1997) whose gates are clamped lines in what it is shown
    and what it remembers, chosen by the boolean token. A part of it is a register that carries the colour
    under one gate of its own, so that colour is kept, not re-learned.
 
 No point looks at another and nothing here knows a leaf, an operator's formula, a pixel or a library.
-
-Blocks of pixels are proved to have one colour by `Slopes`. For the distance f of a leaf, leaf coordinates p
-in a cell, and q within a radius of p,
-
-    |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s,
-
-where s depends on the cell and the radius. `lab.slopes` proves it for learned leaves, and it is shipped
-beside the weights; for elements it is computed from their nodes. Where nothing is known it is infinite.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass
-from types import MappingProxyType
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 import numpy.typing as npt
 
 from scenelang.compiler.lifting import PLANE_LAYOUT, Layout
-from scenelang.drawing.arrays import NUMPY, Array, Arrays, Layers
+from scenelang.drawing.arrays import NUMPY, Array, Layers
+from scenelang.drawing.neural.units import FEATURES, UP, LeafUnits
+from scenelang.drawing.solid.norms import LINES, Lifted
 from scenelang.language.words import TOKENS as WORDS
 
 TOKENS = len(WORDS)
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
-EXTENT = 2.6  # leaf units: half a side of a grid that corrects a decoder
-LEVEL_NODES = 161  # along a side of it
 
 
 @dataclass(frozen=True, slots=True)
@@ -53,7 +45,9 @@ class FramedConfig:
     material_code: int = 12  # entries of the material code
     features: int = 1  # distance-like features F of an object at a point
     state: int = 1  # entries S of the LSTM state
-    decoder_width: int = 32  # hidden units of the decoder's two layers
+    decoder_width: int = 32  # hidden units of the decoder's two layers, where they are rectified
+    units: int = 0  # norm units of the decoder, without those of notches; 0: it has rectified ones
+    hidden: int = 0  # rectified units between the codes and the weights of norms
     paint_lines: int = 2  # lines L of which the highest opens the register's gate
 
 
@@ -73,20 +67,17 @@ class Cell(NamedTuple):
     bump: Array  # (…, S, 1): by how much a half-open gate lowers the state, times four
 
 
-class FramedNetwork:
+class FramedNetwork(Lifted):
     """The formulas of the network, over parameters of `FramedArrays` or of torch's module `Framed`."""
 
     config: FramedConfig
-    slopes: Mapping[bytes, Any] = MappingProxyType({})  # proved `Slopes`, by the bytes of codes
-    levels: Callable[[], Mapping[bytes, Any]] = dict  # grids of `EXTENT` that are added far from outlines
     layout: Layout = PLANE_LAYOUT
-    xp: ClassVar[Arrays]
     codes: Any  # (geometries, C)
     material_codes: Any  # (materials, material_code)
     albedo: Any  # (material_code + 1, 3)
-    decoder_w: Any  # (C + 1, d, G), (C + 1, G, G), (C + 1, G, F)
-    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, F)
-    far: Any  # (F,): growth of the features beyond the rim
+    decoder_w: Any  # (C + 1, d, G), (C + 1, G, G), (C + 1, G, F), or none
+    decoder_b: Any  # (C + 1, G), (C + 1, G), (C + 1, F), or none
+    far: Any  # (F,): growth of the features beyond the rim, or none
     cell_lines: Any  # (TOKENS, F + S, S + L)
     cell_gain: Any  # (TOKENS, S + L): a logarithm
     cell_bias: Any  # (TOKENS, S + L)
@@ -104,8 +95,10 @@ class FramedNetwork:
             layers.append((mixed.reshape(len(code), *w.shape[1:]).swapaxes(1, 2), one @ b))
         return Decoder(layers, self.far[:, None])
 
-    def decoders(self, codes: Array) -> list[Decoder]:
-        """Decoders of the codes (M, C), mixed together and contiguous."""
+    def decoders(self, codes: Array) -> list[Any]:
+        """Decoders of the codes (M, C): `LeafUnits`, or of a network of before mixed together."""
+        if self.config.units:
+            return [LeafUnits(self.xp, self.norms(code, RADIUS, UP, notched=True)) for code in codes]
         layers, far = self.decoder_weights(codes)
         return [Decoder([(self.xp.packed(w[i]), b[i]) for w, b in layers], far) for i in range(len(codes))]
 
@@ -121,10 +114,12 @@ class FramedNetwork:
         """Albedo (M, 3) of material codes (M, material_code); one constant value a material."""
         return material_code @ self.albedo[:-1] + self.albedo[-1]
 
-    def decode(self, q: Array, radius: Array | None, scale: Array | float, decoder: Decoder) -> Array:
+    def decode(self, q: Array, radius: Array | None, scale: Array | float, decoder: Any) -> Array:
         """Features (…, F, M) of leaf coordinates (…, d, M), whose lengths ``radius`` are None where none lies
-        beyond `RADIUS`; ``scale`` is the world distance per leaf distance.
+        beyond `RADIUS`; ``scale`` is the world distance per leaf distance. Of norms, of (d, M).
         """
+        if not isinstance(decoder, Decoder):
+            return decoder.distance(q)[None] * scale
         if radius is None:
             return self.xp.perceptron(q, decoder.layers) * scale  # (…, F, M)
         x = self.xp.perceptron(q * (RADIUS / radius.clip(RADIUS)), decoder.layers)
@@ -153,7 +148,8 @@ class FramedArrays(FramedNetwork):
         self.config = config
         for name, value in arrays.items():
             setattr(self, name, value)
-        self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
+        if not config.units:
+            self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
 
 
 def parameter_shapes(
@@ -161,13 +157,19 @@ def parameter_shapes(
 ) -> dict[str, tuple[int, ...]]:
     """Shapes of a network's parameters in a file, by name."""
     sizes, rows = [d, c.decoder_width, c.decoder_width, c.features], c.state + c.paint_lines
+    code = c.code + c.hidden + 1
+    norms = {"lines": (code, LINES * (c.units + 2), FEATURES), "radius": (code,)}
+    layers = {
+        **{f"decoder_w.{i}": (c.code + 1, *sizes[i : i + 2]) for i in range(3)},
+        **{f"decoder_b.{i}": (c.code + 1, sizes[i + 1]) for i in range(3)},
+        "far": (c.features,),
+    }
     return {
         "codes": (geometries, c.code),
         "material_codes": (materials, c.material_code),
         "albedo": (c.material_code + 1, 3),
-        **{f"decoder_w.{i}": (c.code + 1, *sizes[i : i + 2]) for i in range(3)},
-        **{f"decoder_b.{i}": (c.code + 1, sizes[i + 1]) for i in range(3)},
-        "far": (c.features,),
+        **({"lift_w": (c.code, c.hidden), "lift_b": (c.hidden,)} if c.hidden else {}),
+        **(norms if c.units else layers),
         "edge_slope": (),
         "cell_lines": (TOKENS, c.features + c.state, rows),
         "cell_gain": (TOKENS, rows),
@@ -180,14 +182,18 @@ def parameter_shapes(
 
 Floats = npt.NDArray[np.float64]
 STEEP = 1.05  # that of a true distance is 1
-NODE = 1 / 128  # leaf units: of the grid in the proof
+NODE = 1 / 128  # leaf units, within which nothing is said
 CELLS = 32  # along a side of [-RADIUS, RADIUS]
 RADII = 1 / 16, 1 / 8, 1 / 4  # leaf units
 SIDE = 2 * RADIUS / CELLS
 
 
 class Slopes:
-    """s by place and radius: ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, and
+    """How fast the distance f of an element changes: for p in a cell, and q within a radius of p,
+
+        |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s
+
+    with s by place and radius, ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, and
     ``far``, by how much faster f may change where points may lie beyond `RADIUS`.
     """
 

@@ -22,7 +22,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 from functools import lru_cache
 from itertools import product
-from typing import Any, ClassVar, NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -30,9 +30,9 @@ from scenelang.assets.element import Element
 from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.groups import SMOOTH, SUBTRACT
 from scenelang.compiler.lifting import SOLID_LAYOUT, Layout
-from scenelang.drawing.arrays import NUMPY, SMOOTH_BLOCK, Array, Arrays, Smooth
+from scenelang.drawing.arrays import NUMPY, SMOOTH_BLOCK, Array, Smooth
 from scenelang.drawing.neural.network import TOKENS
-from scenelang.drawing.solid.norms import FEATURES, LINES, Norms, answers, norms
+from scenelang.drawing.solid.norms import FEATURES, LINES, Lifted, Norms, answers
 
 LEVELS = 7  # of halvings of the cube's cells
 STEEPEST = 1.1  # change of a distance over a way of 1 at most; the march trusts in 1
@@ -128,19 +128,14 @@ class Wanted(IntEnum):
     ALL = 2  # and the colour
 
 
-class SolidNetwork:
+class SolidNetwork(Lifted):
     """The formulas of the network, over parameters of either library."""
 
     config: SolidConfig
     layout: Layout = SOLID_LAYOUT
-    xp: ClassVar[Arrays]
     codes: Any  # (geometries, C)
     material_codes: Any  # (materials, material_code)
     albedo: Any  # (material_code + 1, 4): colour and medium
-    lift_w: Any  # (C, H), or none
-    lift_b: Any  # (H,), or none
-    lines: Any  # (C', 3 units + 3, FEATURES), or none
-    radius: Any  # (C',), or none
     decoder_w: Any  # (C', 3, G), (C', G, G), (C', G, 1), or none
     decoder_b: Any  # (C', G), (C', G), (C', 1), or none
     segment_w: Any  # (C', 5, S), (C', S, S), (C', S, 1), or none
@@ -153,20 +148,11 @@ class SolidNetwork:
     last: Any = None  # the `Around` of the last picture
     until_s: float = float("inf")  # processor seconds of the process when the picture has to be done
 
-    def lifted(self, code: Array) -> Array:
-        """What weights are linear in (C',): a code (C,), its hidden units, and 1."""
-        parts = [code, self.xp.full((1,), 1.0, code)]
-        if self.config.hidden:
-            parts.insert(1, (code @ self.lift_w + self.lift_b).clip(0.0))
-        return self.xp.concat(parts, 0)
-
     def decoder(self, code: Array) -> Smooth | Norms:
         """The decoder of a code (C,)."""
         if not self.config.units:
             return self._layers(code, self.decoder_w, self.decoder_b)
-        one, lines = self.lifted(code), self.lines
-        own = (one @ lines.reshape(len(lines), -1)).reshape(lines.shape[1:])
-        return norms(self.xp, own, one @ self.radius, RADIUS)
+        return self.norms(code, RADIUS)
 
     def _layers(self, code: Array, weights: Sequence[Array], biases: Sequence[Array]) -> Smooth:
         one = self.lifted(code)

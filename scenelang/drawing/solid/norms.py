@@ -17,7 +17,7 @@ from __future__ import annotations
 
 from functools import reduce
 from itertools import accumulate
-from typing import NamedTuple
+from typing import Any, ClassVar, NamedTuple
 
 import numpy as np
 
@@ -38,6 +38,7 @@ class Norms(NamedTuple):
     features: tuple[int, ...]
     units: tuple[int, ...]  # (K,) lines of each
     inner: int  # lines inside
+    notch: int = 0  # lines of a unit that is taken away, before the others
 
     @property
     def products(self) -> int:
@@ -45,13 +46,17 @@ class Norms(NamedTuple):
         return len(self.b) * (len(self.features) + 1)
 
 
-def norms(xp: Arrays, lines: Array, radius: Array, far: float) -> Norms:
-    """The decoder of lines (3 K + 3, 8) and a radius (), of points within ``far`` of the origin."""
+def norms(
+    xp: Arrays, lines: Array, radius: Array, far: float, up: int = UP, *, notched: bool = False
+) -> Norms:
+    """The decoder of lines (3 K + 3, features) and a radius (), of points within ``far`` of the origin; the
+    feature ``up`` may be below zero. If ``notched``, the first unit is taken away.
+    """
     w = np.asarray(xp.to_numpy(lines), np.float64)
     signs = w.copy()
-    signs[:, UP] = abs(w[:, UP])
+    signs[:, up] = abs(w[:, up])
     highest = w[:, -1] + far * signs[:, :-1].clip(0.0).sum(1)
-    signs[:, UP] = -abs(w[:, UP])
+    signs[:, up] = -abs(w[:, up])
     lowest = w[:, -1] + far * signs[:, :-1].clip(None, 0.0).sum(1)
     alive = highest > 0
     alive[-LINES:] = (lowest[-LINES:] < 0).all()  # above zero anywhere, the lines inside say nothing
@@ -60,8 +65,34 @@ def norms(xp: Arrays, lines: Array, radius: Array, far: float) -> Norms:
     counts = alive.reshape(-1, LINES).sum(1).tolist()
     used = np.flatnonzero(abs(w[alive, :-1]).sum(0) > _NONE)
     kept = xp.packed(lines[np.flatnonzero(alive)])
-    units = tuple(filter(None, counts[:-1]))
-    return Norms(xp.packed(kept[:, used]), kept[:, -1], radius, tuple(used.tolist()), units, counts[-1])
+    units, notch = tuple(filter(None, counts[notched:-1])), counts[0] if notched else 0
+    return Norms(
+        xp.packed(kept[:, used]), kept[:, -1], radius, tuple(used.tolist()), units, counts[-1], notch
+    )
+
+
+class Lifted:
+    """A network whose weights are linear in a code, hidden units of it, and 1."""
+
+    config: Any  # sizes
+    xp: ClassVar[Arrays]
+    lift_w: Any  # (C, H), or none
+    lift_b: Any  # (H,), or none
+    lines: Any  # (C + H + 1, lines, features), or none
+    radius: Any  # (C + H + 1,), or none
+
+    def lifted(self, code: Array) -> Array:
+        """What weights are linear in: a code (C,), its hidden units, and 1."""
+        parts = [code, self.xp.full((1,), 1.0, code)]
+        if self.config.hidden:
+            parts.insert(1, (code @ self.lift_w + self.lift_b).clip(0.0))
+        return self.xp.concat(parts, 0)
+
+    def norms(self, code: Array, far: float, up: int = UP, *, notched: bool = False) -> Norms:
+        """The norm units of a code (C,), as of `norms`."""
+        one, lines = self.lifted(code), self.lines
+        own = (one @ lines.reshape(len(lines), -1)).reshape(lines.shape[1:])
+        return norms(self.xp, own, one @ self.radius, far, up, notched=notched)
 
 
 def answers(xp: Arrays, q: Array, layers: Norms, gradient: bool) -> Array:

@@ -51,7 +51,6 @@ vec2 place(int k) {
 }
 
 float learned(int shape, vec2 q);
-float shortOf(int shape, vec2 q); // how much it is short by, which leaves with a skin show
 
 vec4 texel(sampler2D data, int at) {
   return texelFetch(data, ivec2(at & 1023, at >> 10), 0);
@@ -409,7 +408,6 @@ void meet(vec2 p, ivec2 span) {
         distance = learned(int(c.x), q);
 #ifdef SKINS
         vec4 skin = texel(rows, at + 4);
-        if (c.y == 0.0 && (skin.x != 0.0 || skin.y > 0.0 || skin.z != 0.0)) distance += shortOf(int(c.x), q);
         distance -= skin.x;
         distance = (skin.y > 0.0 ? abs(distance) - skin.y : distance) - skin.z;
 #endif

@@ -8,51 +8,17 @@ import { rateOf, reaches, skinReach, steepest, tileLists } from "./ways.js";
 const WIDE = 1024; // texels of a row of numbers; as in plane.glsl
 const MOST_AT_ONCE = 2 ** 28; // pairs of an object and a pixel
 
-/** GLSL of a decoder: weights as numbers in the text, which is several times as fast as fetching them. */
-function decoderText(name, { units: [n, m], weights, far }) {
-  let at = 0;
-  const next = (count) => Array.from(weights.subarray(at, (at += count)));
-  const sum = (numbers, names) => numbers.map((w, i) => `${literal(w)} * ${names[i]}`).join(" + ");
-  const lines = [`float ${name}(vec2 q) {`, "  float r = length(q), grown = max(r - RIM, 0.0);"];
-  lines.push("  q *= RIM / max(r, RIM);");
-  const hidden = Array.from({ length: n }, (_, i) => `h${i}`);
-  const last = Array.from({ length: m }, (_, i) => `g${i}`);
-  for (const h of hidden) {
-    const [x, y, bias] = next(3);
-    lines.push(`  float ${h} = max(${sum([x, y], ["q.x", "q.y"])} + ${literal(bias)}, 0.0);`);
-  }
-  for (const g of last) {
-    const [bias, ...factors] = next(1 + n);
-    lines.push(`  float ${g} = max(${literal(bias)} + ${sum(factors, hidden)}, 0.0);`);
-  }
-  const factors = next(m);
-  const [bias] = next(1);
-  lines.push(`  SPEND(${3 * n + m * (n + 1) + m + 8});`);
-  lines.push(`  return ${literal(bias)} + ${sum(factors, last)} + grown * ${literal(far)};`, "}");
-  return lines.join("\n");
-}
-
-/** A number in GLSL, exact of a float32. */
-function literal(x) {
-  const text = Math.fround(x).toPrecision(9).replace(/(\.\d*?)0+(e|$)/, "$1$2");
-  const whole = /[.e]/.test(text) ? text : `${text}.0`;
-  return x < 0 ? `(${whole})` : whole;
-}
-
 /** The fragment shader for shapes in use, with names defined. */
-function fragmentText(view, leaves, shapes, defines) {
+function fragmentText(view, shapes, defines) {
   const head = ["#version 300 es", ...defines.map((name) => `#define ${name}`), view.shader.fragment];
   const used = shapes.filter((shape) => shape < view.network.decoders.length);
-  for (const shape of used) head.push(decoderText(`decoder${shape}`, view.network.decoders[shape]));
+  for (const shape of used) {
+    const { text, products } = view.network.decoders[shape];
+    head.push(`float decoder${shape}(vec2 q) {`, `SPEND(${products});`, text, "}");
+  }
   head.push("float learned(int shape, vec2 q) {", "  switch (shape) {");
   for (const shape of used) head.push(`    case ${shape}: return decoder${shape}(q);`);
   head.push("    default: return FAR;", "  }", "}");
-  head.push("float shortOf(int shape, vec2 q) {", "  switch (shape) {");
-  for (const shape of used.filter((shape) => leaves[shape].level)) {
-    const { first, level: { side, extent } } = leaves[shape];
-    head.push(`    case ${shape}: return lattice(clamp(q / ${literal(extent)}, -1.0, 1.0), ${first}, ${side});`);
-  }
-  head.push("    default: return 0.0;", "  }", "}");
   return head.join("\n");
 }
 
@@ -85,15 +51,15 @@ function packed({ network, materials }, leaves, pictures, { rows }, joins, reach
     const { steps, scale } = row;
     const paint = joins[i].draws ? row.paint : -1; // the others leave colours as they are
     begins.push(numbers.length / 4);
-    const { bounds, far, first, side, off } = leaves[row.shape];
+    const { bounds, first, side } = leaves[row.shape];
     const moves = steps.reduce((total, [kind]) => total + (kind === "map" ? 2 : 1), 0);
     const albedo = materials[row.material].albedo;
     const colour = row.colour.map((share, k) => Math.min(Math.max(share * albedo[k], 0), 1));
     numbers.push(scale, narrow(joins[i]), flagsOf(joins[i], row), steps.length + (1 - row.opacity) / 2);
-    const more = skinned ? (skinReach(row) + off) / Math.min(far, 1) : 0;
+    const more = skinned ? skinReach(row) : 0;
     numbers.push(...bounds.map((bound) => bound + more), Math.min(reach[i], 1e30));
     numbers.push(side ? first : row.shape, side, paint < 0 ? 0 : head + moves, 0);
-    numbers.push(...colour, Math.min(far, 1) * scale);
+    numbers.push(...colour, scale);
     if (skinned) numbers.push(...(row.skin ?? [0, 0, 0, 0]));
     for (const step of steps) numbers.push(...texelsOf(step));
     if (paint < 0) return;
@@ -133,8 +99,8 @@ const hides = ({ operator, around, seen }, { opacity }) => (
 );
 
 /** Radius of a disc within an object whose leaf has one of a radius, 0 where none is known. */
-const filled = ({ inner, off }, { skin = [0, 0, 0] }) => (
-  skin[1] > 0 || !inner ? 0 : Math.max(inner - off + skin[0] + skin[2], 0)
+const filled = ({ inner }, { skin = [0, 0, 0] }) => (
+  skin[1] > 0 || !inner ? 0 : Math.max(inner + skin[0] + skin[2], 0)
 );
 
 /** Tiles' lists as texels: where each begins and how long it is, then texels of rows, four to one. */
@@ -171,21 +137,17 @@ export function planeDrawer(gl, view) {
   const held = { rows: floats(gl, new Float32Array(4)), lists: floats(gl, new Float32Array(4)) };
   const kinds = [];
   const brought = view.shapes.slice(network.decoders.length);
-  const levels = network.decoders.map(({ level }) => Float32Array.from(level?.values ?? [], (n) => n * level.step));
-  const [nodes, ofShape] = joined([...levels, ...brought.map(nodesOf)], Float32Array);
-  const most = (values) => values.reduce((found, value) => Math.max(found, Math.abs(value)), 0);
+  const [nodes, ofShape] = joined(brought.map(nodesOf), Float32Array);
   const [texels, ofPicture] = joined(view.paints.map((paint) => paint.texels ?? []), Uint8Array);
   const leaves = [
-    ...network.decoders.map((decoder, i) => ({ ...decoder, side: 0, first: ofShape[i], off: most(levels[i]) })),
-    ...brought.map(({ bounds, finest }, i) => (
-      { bounds, inner: 0, far: 1, side: finest ?? -1, first: ofShape[levels.length + i], off: 0 }
-    )),
+    ...network.decoders.map((decoder) => ({ ...decoder, side: 0, first: 0 })),
+    ...brought.map(({ bounds, finest }, i) => ({ bounds, inner: 0, side: finest ?? -1, first: ofShape[i] })),
   ];
   const pictures = view.paints.map((paint, i) => ({ ...paint, first: ofPicture[i] / 3 }));
   if (nodes.length) {
     kinds.push("NODES");
     if (brought.some(isOutline)) kinds.push("OUTLINES");
-    if (!brought.every(isOutline) || levels.some((level) => level.length)) kinds.push("GRIDS");
+    if (!brought.every(isOutline)) kinds.push("GRIDS");
     held.nodes = sheet(gl, nodes, [gl.R32F, gl.RED, gl.FLOAT], 1);
   }
   if (pictures.length) {
@@ -203,7 +165,7 @@ export function planeDrawer(gl, view) {
     defines.push(...(skinned ? ["SKINS"] : []), ...(clear ? ["CLEAR"] : []), ...(define ? [define] : []));
     const key = [...defines, ...used].join();
     if (!programs.has(key)) {
-      const found = linked(gl, fragmentText(view, leaves, used, defines));
+      const found = linked(gl, fragmentText(view, used, defines));
       const place = (name) => gl.getUniformLocation(found, name);
       gl.useProgram(found);
       textures.forEach((name, unit) => gl.uniform1i(place(name), unit));
