@@ -45,7 +45,7 @@ class How(NamedTuple):
             rule and none of a model's limits.
         device: where torch runs the network, whatever the picture's size; with ``"auto"`` numpy draws solids
             and small stills, and torch others on CUDA where there is any.
-        threads: tiles drawn at the same time; by default one for each 131,072 pixels, but no more than there
+        threads: tiles drawn at the same time; by default one for each 32,768 pixels, but no more than there
             are usable cores. Numpy draws the plane in one.
         samples: of a pixel: ``"four"`` as the language defines, ``"adaptive"``, four near outlines and one
             elsewhere, which looks the same, ``"one"``, which is faster and has hard edges, or ``"draft"``,
@@ -139,9 +139,8 @@ def keep_memory() -> bool:
     return all(mallopt(option, KEEP_BYTES) == 1 for option in (_M_MMAP_THRESHOLD, _M_TRIM_THRESHOLD))
 
 
-THREAD_PIXELS = 1 << 17
-"""Pixels of a picture for each thread that draws it: with fewer, threads wait for each other longer than they
-save (`python -m lab bench floor --threads 2`)."""
+THREAD_PIXELS = 1 << 15
+"""Pixels of a picture for each thread that draws it: smaller ones take as long as threads take to begin."""
 
 
 def threads_for(canvas: tuple[int, int]) -> int:
