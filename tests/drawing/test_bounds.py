@@ -76,6 +76,7 @@ def test_a_rise_holds_for_units_of_any_kind() -> None:
         decoder = LeafUnits(NUMPY, norms(NUMPY, lines, np.float64(0.3), RADIUS, UP, notched=True))
         assert left_of(decoder, rng) >= -1e-12
     assert np.isinf(decoder.rise(np.full((2, 1), np.nan), np.ones(1)))
+    assert decoder.rise(np.zeros((2, 1)), np.full(1, np.inf)) > 1e6
 
 
 @pytest.mark.parametrize("side", [5, 33, 70])

@@ -27,6 +27,8 @@ FEATURES = FIRST + 2 * len(SECTORS) + 1
 GROUPS = (0,), (1, 2), (3,), *((FIRST + 2 * i, FIRST + 2 * i + 1) for i in range(len(SECTORS)))
 """Features that together change by no more than a point moves."""
 
+FARTHEST = 1e9  # leaf units
+
 Floats = npt.NDArray[np.float64]
 
 
@@ -100,6 +102,7 @@ class LeafUnits:
     def rise(self, q: Floats, radius: Floats) -> Floats:
         """Greatest difference (M,) of distances at leaf coordinates (2, M) from those within radii (M,)."""
         *outer, inner = self.parts
+        radius = np.minimum(radius, FARTHEST)  # of an infinite one no share is a number
         levels = self._levels(NUMPY, q, self._w, self._b)
         more = self._steep[:, None] * radius
         low, middle, high = [], [], []
