@@ -37,7 +37,7 @@ from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, 
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.assets import grid_shape, texture_of
 from scenelang.drawing.neural.frames import MOST, read_skins
-from scenelang.drawing.solid.network import BLEND, Formula, SolidNetwork, Wanted, element_box
+from scenelang.drawing.solid.network import BLEND, Formula, SolidCell, SolidNetwork, Wanted, element_box
 from scenelang.drawing.solid.norms import Norms
 
 UNITS, LINES, WIDEST = 8, 27, 32  # of decoders at most
@@ -412,9 +412,7 @@ class Tables:
         self.objects = read_objects(vectors, network.layout, groups, widths, reach)
         rows = self.objects.rows
         self._kept: list[Any] = []  # what tables point to
-        self.detail = np.zeros(
-            count, np.float32
-        )  # texels that a way of a world unit may cross; 0 without any
+        self.detail = np.zeros(count, np.float32)  # texels that a way of a world unit may cross, or 0
         self.edged = False  # whether a decoder shows edges, which rays may clip
         with network.xp.inference():
             draws = self.objects.flagged(DRAWS)
@@ -524,20 +522,31 @@ def _layers(decoder: Smooth, xp: Any) -> npt.NDArray[np.float32]:
     return np.concatenate(parts).astype(np.float32)
 
 
+def cell_keys(groups: Groups, widths: Floats) -> Floats:
+    """Tokens and widths of blends (N + G, 2) by which objects and, behind these, groups join; ``widths`` (N,)
+    are those of rows.
+    """
+    operators = np.concatenate([groups.tokens, groups.joins])
+    return np.stack(
+        [operators, np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])], 1
+    )
+
+
+def cell_of(network: SolidNetwork, token: int, width: float) -> tuple[SolidCell, ...]:
+    """The cell of a token, whose edges are rounded where a cut has a width."""
+    rounded = token >= SUBTRACT and width
+    return network.cut(token, width) if rounded else network.cell(token, width or BLEND)
+
+
 def _cells(network: SolidNetwork, groups: Groups, widths: Floats) -> Rows:
     """Cells of the objects and, behind these, of the groups; ``widths`` are those of rows' blends."""
-    operators = np.concatenate([groups.tokens, groups.joins])
-    widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
-    keys = np.stack([operators, widths], 1)
-    known, which = np.unique(keys, axis=0, return_inverse=True)
+    known, which = np.unique(cell_keys(groups, widths), axis=0, return_inverse=True)
     if (network.config.paint_lines, network.config.kind_lines) != (2, 2):
         raise ProgramError("a cell of other lines than the kernel knows")
     result = np.zeros(len(known), CELL)
     for row, (token, width) in zip(result, known.tolist(), strict=True):
-        cut = token >= SUBTRACT and width
-        cell = network.cut(int(token), width) if cut else network.cell(int(token), width or BLEND)
         row["smooth"] = token == SMOOTH
-        for name, part in cell[Wanted.ALL]._asdict().items():
+        for name, part in cell_of(network, int(token), width)[Wanted.ALL]._asdict().items():
             values = np.asarray(network.xp.to_numpy(part)).reshape(-1)
             row[name] = values if len(values) > 1 else values[0]
     return result[which.reshape(-1)]

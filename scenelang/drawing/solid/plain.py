@@ -18,7 +18,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenelang.assets.element import Element
-from scenelang.compiler.groups import OPERATOR, SMOOTH, SUBTRACT, read_groups, widths_of
+from scenelang.compiler.groups import OPERATOR, SMOOTH, read_groups, widths_of
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
 from scenelang.drawing.how import check_time
 from scenelang.drawing.kernel import Asked
@@ -26,9 +26,20 @@ from scenelang.drawing.neural.assets import Texture, grid_shape, texture_of
 from scenelang.drawing.neural.frames import Skins
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import HALVINGS, INF, STEPS, Pieces, Trail, Work
-from scenelang.drawing.solid.network import BLEND, EMPTY, RADIUS, SolidCell, SolidNetwork, Wanted
+from scenelang.drawing.solid.network import EMPTY, RADIUS, SolidCell, SolidNetwork, Wanted
 from scenelang.drawing.solid.soft import ASIDE, FLOOR, HASTE, HURRY, PARTS, SIDE, STRIDE, WIDE, share
-from scenelang.drawing.tables import BEGINS, BOXED, CLIPS, DRAWS, MAP, SKINNED, STOPS, TURN_Z
+from scenelang.drawing.tables import (
+    BEGINS,
+    BOXED,
+    CLIPS,
+    DRAWS,
+    MAP,
+    SKINNED,
+    STOPS,
+    TURN_Z,
+    cell_keys,
+    cell_of,
+)
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
 TOUCH = 1e-5  # world units: so near counts as met
@@ -147,16 +158,16 @@ class _Ways(NamedTuple):
     rate: Array
 
     def at(self, xp: Arrays, index: Array) -> _Ways:
-        """Those of some rays."""
+        """The ways of some rays."""
         return _Ways(*self[:3], *(xp.take(part, index) for part in self[3:]))
 
     def first(self, xp: Arrays) -> Array:
-        """Where rays (n,) come to the first ball."""
+        """Distances (n,) to the first ball."""
         return xp.least(xp.select(self.stops, self.begin, INF))
 
 
 class _Met(NamedTuple):
-    """What n rays meet where they are."""
+    """The field where n rays are."""
 
     d: Array
     look: Array  # the register (R, n), where it is asked for
@@ -195,13 +206,8 @@ class PlainField(SolidField):
         (vectors, tokens, _), network = self.rows, self.network
         groups = read_groups(tokens)
         widths = widths_of(np.asarray(tokens, np.intp) & OPERATOR, network.layout.unpack(vectors).width)
-        operators = np.concatenate([groups.tokens, groups.joins]).tolist()
-        widths = np.concatenate([np.where(groups.first, 0.0, widths), widths[groups.rows]])
-        keys, known = list(zip(operators, widths.tolist(), strict=True)), {}
-        for token, width in dict.fromkeys(keys):
-            cut = token >= SUBTRACT and width
-            cell = network.cut(token, width) if cut else network.cell(token, width or BLEND)
-            known[token, width] = cell, token == SMOOTH
+        keys = [(int(token), width) for token, width in cell_keys(groups, widths).tolist()]
+        known = {key: (cell_of(network, *key), key[0] == SMOOTH) for key in dict.fromkeys(keys)}
         return [known[key] for key in keys]
 
     def _all_solids(self) -> list[_Solid]:
@@ -380,7 +386,7 @@ class PlainField(SolidField):
         xp.put(state, index, xp.concat(rows, 0))
 
     def _unlike(self, a: Array, b: Array) -> Array:
-        """How much media with registers (R, k) differ."""
+        """Differences of media with registers (R, k)."""
         return abs(a - b)[self._marks].sum(0)
 
     def _crossed(
