@@ -70,7 +70,7 @@ class Asked(NamedTuple):
 
 
 class Trails(NamedTuple):
-    """What M rays met."""
+    """Surfaces and media that M rays met."""
 
     hit: Floats  # (M,) how far the first opaque surface is, inf where there is none
     length: Floats  # (M,) world units in media before that or before the ray's end

@@ -121,7 +121,7 @@ class Field:
         self.shapes: list[Any] = [*learned]
         """Decoders, grids and outlines."""
         self.slopes: list[Any] = [None if isinstance(shape, Decoder) else shape for shape in learned]
-        """What tells for each how far distances differ within a radius, None where nothing is known."""
+        """Bounds for each on how far distances differ within a radius, None where nothing is known."""
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
         grown = {self.brought[i] for i in more}
         elements = dict.fromkeys(element for element in self.brought if element is not None)

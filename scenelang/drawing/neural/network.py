@@ -189,7 +189,7 @@ SIDE = 2 * RADIUS / CELLS
 
 
 class Slopes:
-    """How fast the distance f of an element changes: for p in a cell, and q within a radius of p,
+    """Bounds on how fast the distance f of an element changes: for p in a cell, and q within a radius of p,
 
         |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s
 

@@ -82,7 +82,7 @@ class Lifted:
     radius: Any  # (C + H + 1,), or none
 
     def lifted(self, code: Array) -> Array:
-        """What weights are linear in: a code (C,), its hidden units, and 1."""
+        """A code (C,), its hidden units, and 1, in which weights are linear."""
         parts = [code, self.xp.full((1,), 1.0, code)]
         if self.config.hidden:
             parts.insert(1, (code @ self.lift_w + self.lift_b).clip(0.0))
