@@ -14,7 +14,8 @@
                      int32_t, int32_t, float *, float *, int32_t *, float *, int64_t *, Piece *, int64_t, void *); \
     void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
                    float *, int64_t *, void *); \
-    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *);
+    void shade_##v(const Scene *, const Stage *, int32_t, int32_t, int32_t, int32_t, float *, int64_t *, void *); \
+    void finish_##v(const Scene *, const Stage *, int32_t, int32_t, int32_t, int32_t, const float *, int32_t *, float *, int64_t *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -64,7 +65,11 @@ OUT void cones(int32_t variant, const Scene *s, int64_t n, const float *at, floa
                const float *spread, const float *normal, float *part, int64_t *counts, void *memory) {
     PICK(cones, s, n, at, radius, way, far, spread, normal, part, counts, memory);
 }
-OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light,
-               float *alpha, int64_t *counts, void *memory) {
-    PICK(shade, s, stage, n, across, way, light, alpha, counts, memory);
+OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int32_t top, int32_t bottom, int32_t first, int32_t last,
+               float *picture, int64_t *counts, void *memory) {
+    PICK(shade, s, stage, top, bottom, first, last, picture, counts, memory);
+}
+OUT void finish(int32_t variant, const Scene *s, const Stage *stage, int32_t top, int32_t bottom, int32_t first, int32_t last,
+                const float *picture, int32_t *pixel, float *out, int64_t *counts, void *memory) {
+    PICK(finish, s, stage, top, bottom, first, last, picture, pixel, out, counts, memory);
 }

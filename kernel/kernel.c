@@ -1,75 +1,12 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
-#include "cone.h"
-#include "shade.h"
-#define BLOCK (256 / W)  // packets that have a list of objects in common
+#include "band.h"
 #ifndef NAME
 #define NAME(x) x
 #endif
 
-typedef struct { V at; M in; const Object *object; int far; } Near;  // an object that points of a packet may meet
-
-static void *aligned(void *p) { return (void *)(((uintptr_t)p + 63) & ~(uintptr_t)63); }
 // Bytes of scratch that calls need.
-int64_t NAME(scratch)(const Scene *s) { return 128 + (int64_t)(sizeof(Slot) + sizeof(int32_t)) * (s->objects + 1); }
+int64_t NAME(scratch)(const Scene *s) { return room_of(s); }
 
-IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
-    for (int k = 0; k < W; k++) {
-        int64_t j = at + k < n ? at + k : n - 1;
-        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
-    }
-}
-// Objects, as numbers that rise, that points of packets from `from` on may meet within their reach.
-static int listed(const Scene *s, const float *p, const float *reach, int64_t n, int64_t from, int32_t *list) {
-    V low = {all(BIG), all(BIG), all(BIG)}, high = {all(-BIG), all(-BIG), all(-BIG)};
-    float far = 0, least[3] = {BIG, BIG, BIG}, most[3] = {-BIG, -BIG, -BIG}, centre[3], ball = 0;
-    for (int64_t i = from; i < n && i < from + BLOCK * W; i += W) {
-        V q;
-        read_points(p, n, i, &q);
-        low = (V){min2(q.x, low.x), min2(q.y, low.y), min2(q.z, low.z)};
-        high = (V){max2(q.x, high.x), max2(q.y, high.y), max2(q.z, high.z)};
-        for (int k = 0; k < W && i + k < n; k++) far = reach[i + k] > far ? reach[i + k] : far;
-    }
-    for (int k = 0; k < W; k++) {
-        float a[3] = {low.x[k], low.y[k], low.z[k]}, b[3] = {high.x[k], high.y[k], high.z[k]};
-        for (int d = 0; d < 3; d++) {
-            least[d] = a[d] < least[d] ? a[d] : least[d];
-            most[d] = b[d] > most[d] ? b[d] : most[d];
-        }
-    }
-    for (int d = 0; d < 3; d++) {
-        centre[d] = 0.5f * (least[d] + most[d]);
-        ball += 0.25f * (most[d] - least[d]) * (most[d] - least[d]);
-    }
-    ball = sqrtf(ball);
-    int count = 0;
-    for (int i = 0; i < s->objects; i++) {
-        const Object *o = s->object + i;
-        float x = o->centre[0] - centre[0], y = o->centre[1] - centre[1], z = o->centre[2] - centre[2];
-        float room = ball + o->extent * (1 + far * o->reach / (o->scale * o->ball));
-        int kept = s->clipping && (o->ends || o->flags & (CLIPS | BEGINS));  // others depend on it
-        list[count] = i;
-        count += kept || !(x * x + y * y + z * z > room * room * 1.0001f + 1e-12f);
-    }
-    return count;
-}
-// Objects of a list whose balls, larger by reaches, hold points of a packet, last ones first; their number.
-IN int held(const Scene *s, V q, F reach, float far, M some, const int32_t *list, int count, Near *near) {
-    M there = some, theres[DEEP + 1];  // within all that cuts away what is outside of it
-    int n = 0, around = 0;
-    for (int k = count - 1; k >= 0; k--) {
-        const Object *o = s->object + list[k];
-        if (s->clipping) for (int e = 0; e < o->ends; e++) theres[around++] = there;
-        V a = mapped(o->map, q);
-        F ball = o->ball + reach * (o->reach / o->scale);
-        M within = dot(a, a) <= ball * ball, in = within & there;
-        if (s->clipping) {
-            if (o->flags & BEGINS) there = theres[--around];
-            if (o->flags & CLIPS) there &= within;
-        }
-        if (any(in)) near[n++] = (Near){a, in, o, o->radius + far / o->scale > RIM};
-    }
-    return n;
-}
 IN void store(float *to, int64_t n, int64_t at, F values) {
     if (at + W <= n) memcpy(to + at, &values, sizeof values);
     else memcpy(to + at, &values, 4 * (size_t)(n - at));
@@ -92,13 +29,7 @@ IN int64_t asked(const Scene *s, int64_t n, const float *p, const float *reach, 
             own[k] = reach[j]; some[k] = i + k < n ? -1 : 0;
             far = reach[j] > far ? reach[j] : far;
         }
-        int m = held(s, q, own, far, some, list, count, near);
-        Fold f;
-        fold_open(s, &f, wanted);
-        while (m--) fold_take(s, &f, near[m].object, near[m].at, near[m].in, near[m].far, wanted);
-        fold_close(s, &f, 0, wanted);
-        pairs += f.pairs;
-        State *r = f.state;
+        State told_ = told(s, q, own, far, some, list, count, near, &pairs, wanted), *r = &told_;
         store(distance, n, i, r->d);
         if (wanted & GRADIENT) { store(gradient, n, i, r->g.x); store(gradient + n, n, i, r->g.y); store(gradient + 2 * n, n, i, r->g.z); }
         if (wanted & REGISTER_) for (int k = 0; k < s->rows; k++) store(look + k * n, n, i, r->look[k]);
@@ -121,27 +52,14 @@ int64_t NAME(field)(const Scene *s, int64_t n, const float *p, const float *reac
 void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p, float *distance, float *gradient, float *colour) {
     float *to = colour ? colour : gradient;
     for (int64_t i = 0; i < n; i += W) {
-        V q, g = {all(0), all(0), all(0)};
-        F d = all(0);
+        V q, more;
+        M owner = ints(0);
         read_points(p, n, i, &q);
-        for (int k = 0; k < W && i + k < n; k++) {
-            if (k && object[i + k] == object[i + k - 1]) continue;
-            const Object *o = s->object + object[i + k];
-            M mine;
-            for (int j = 0; j < W; j++) mine[j] = i + j < n && object[i + j] == object[i + k] ? -1 : 0;
-            V slope, local, own = mapped(o->map, q);
-            if (gradient) d = sel(mine, leaf_slope(s, o, own, 1, &slope, &local), d);
-            else if (!colour) d = sel(mine, leaf_distance(s, o, own, 1, &local), d);
-            else if (o->texture < 0) slope = (V){all(o->look[0]), all(o->look[1]), all(o->look[2])};
-            else {
-                leaf_distance(s, o, own, 1, &local);
-                slope = coloured(s->texture + o->texture, local);
-            }
-            if (to) g = choose(mine, slope, g);
-        }
+        for (int k = 0; k < W && i + k < n; k++) owner[k] = object[i + k] + 1;
+        F d = colour ? alone(s, owner, q, &more, REGISTER_) : gradient ? alone(s, owner, q, &more, GRADIENT) : alone(s, owner, q, &more, DISTANCE);
         if (!colour) store(distance, n, i, d);
         if (!to) continue;
-        store(to, n, i, g.x); store(to + n, n, i, g.y); store(to + 2 * n, n, i, g.z);
+        store(to, n, i, more.x); store(to + n, n, i, more.y); store(to + 2 * n, n, i, more.z);
     }
 }
 IN int64_t followed(const Scene *s, int64_t n, int64_t origins, const float *p, const float *way, const float *begin,
@@ -225,32 +143,19 @@ void NAME(cones)(const Scene *s, int64_t n, const float *at, float radius, const
     }
     counts[0] = near; counts[1] = met;
 }
-// Light (3, n) and alpha (n) along n rays of unit ways (3, n) from the eye of a stage, of opaque objects with plain colours;
-// rays lie in rows of `across`. Counts are of rays from lamps, of rays that pass what draws, of
-// points, of pairs of points and objects, and of rays that came to no end.
-void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light, float *alpha,
-                 int64_t counts[5], void *scratch) {
-    Slot *slot = aligned(scratch);
-    int32_t *list = (int32_t *)(slot + s->objects + 1);
-    Shaded w = {0, 0, 0, 0, 0};
-    Beam b;
-    int64_t at[BEAM], rows = across ? n / across : 0, side = 16;
-    if (rows < 16 || across < 16) { across = n; rows = 1; side = BEAM; }
-    for (int64_t top = 0; top < rows; top += 16) for (int64_t left = 0; left < across; left += side) {
-        int k = 0;
-        for (int64_t y = top; y < top + 16 && y < rows; y += 2)  // in pairs of rows, so that packets are compact
-            for (int64_t x = left; x < left + side && x < across; x++)
-                for (int64_t j = y; j < y + 2 && j < rows; j++) {
-                    for (int d = 0; d < 3; d++) b.way.v[d][k] = way[d * n + j * across + x];
-                    at[k++] = j * across + x;
-                }
-        int whole = k;
-        for (; k % W; k++) for (int d = 0; d < 3; d++) b.way.v[d][k] = b.way.v[d][whole - 1];
-        shade_block(s, stage, &b, whole, slot, list, &w);
-        for (int i = 0; i < whole; i++) {
-            for (int d = 0; d < 3; d++) light[d * n + at[i]] = b.light.v[d][i];
-            alpha[at[i]] = b.alpha[i];
-        }
-    }
-    counts[0] = w.lights; counts[1] = w.near; counts[2] = w.steps; counts[3] = w.met; counts[4] = w.lost;
+// Light of the centres of a picture's pixels, in rows from `first` up to `last`, into those from `top` up to `bottom`:
+// (R, bottom - top, width), colours, alpha and, of scenes with textures, the same colours of plain ones. Counts are as `Work`.
+void NAME(shade)(const Scene *s, const Stage *stage, int32_t top, int32_t bottom, int32_t first, int32_t last, float *picture,
+                 int64_t counts[7], void *scratch) {
+    Job j = job_of(s, stage, scratch);
+    centres(&j, top, bottom, first, last, picture);
+    counted(&j, counts);
+}
+// The pixels of such rows, (last - first, width, 3 or 4), by more samples where light differs from row to row or column to
+// column, in sRGB; `pixel` holds as many numbers. The last count is of numbers that are none.
+void NAME(finish)(const Scene *s, const Stage *stage, int32_t top, int32_t bottom, int32_t first, int32_t last,
+                  const float *picture, int32_t *pixel, float *out, int64_t counts[7], void *scratch) {
+    Job j = job_of(s, stage, scratch);
+    finished(&j, top, bottom, first, last, picture, pixel, out);
+    counted(&j, counts);
 }

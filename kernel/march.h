@@ -3,7 +3,7 @@
 // last two bounds predict a surface farther on, a step goes just behind that, by at most `gap` more. Where media
 // differ, steps in them are bounded by each other's surfaces, too, and ways are cut where they do.
 #pragma once
-#include "fold.h"
+#include "points.h"
 #define TOUCH 1e-5f  // world units: so near counts as met
 #define DRIFT 0.2f  // of media that differ along a piece little by little, as `JUMP`
 #define BETWEEN 8  // halvings of a step from one medium to another

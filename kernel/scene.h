@@ -21,6 +21,7 @@ typedef struct {  // one object
     float low[3], high[3];  // a box behind the map, of a `BOXED` one
     float amount, frequency;  // of a displacement
     float first, wall, last, late;  // of a skin: |d - first| - wall - last
+    float detail;  // texels that a way of a world unit may cross, 0 for none
     float look[REGISTER];
     int32_t flags, ends, decoder, step, steps, texture, depth, path[DEEP];
 } Object;
@@ -53,9 +54,13 @@ typedef struct {
     const Cell *cell;  // of the objects, then of the groups
     const Texture *texture;
 } Scene;
-typedef struct { float at[3], power[3]; } Lamp;  // a point; power times colour
+typedef struct { float at[3], power[3], radius; } Lamp;  // 0 of a point; power times colour
 typedef struct {
-    float eye[3], horizon[3], zenith[3], ground[3], floor, gap, ambient[2], fade, nearest, lift;
+    double forward[3], right[3], up[3], px;  // of the camera, of a picture that is 2 wide where `forward` ends; a pixel's side
+    float eye[3], horizon[3], zenith[3], ground[3], floor, gap, ambient[2], fade, nearest, lift, contrast, deep[3];
+    // `deep` tells how wide that picture's half is at a point
     int32_t lamps, grounded, transparent, glow;  // `glow`: the first row of the register that tells it, 0 for none
+    int32_t width, height, count, every, nodes;  // samples of a pixel that differs, or of every one; nodes of a way in a medium
     const Lamp *lamp;
+    const Scene *opaque, *hazy;  // what is opaque alone, and what is not, as lamps of a radius ask
 } Stage;

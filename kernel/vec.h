@@ -86,3 +86,15 @@ IN F exponential(F x) {  // of x <= 0, within 2e-7 of itself
     F p = 1.0f + f * (0.693147182f + f * (0.240226462f + f * (0.0555032f + f * (0.00961672f + f * 0.00133908f))));
     return p * (F)((cut(k) + 127) << 23);
 }
+IN F logarithm(F x) {  // of normal x > 0, within 1e-7 of itself or of 1: Cephes' polynomial
+    M e = (((M)x >> 23) & 255) - 126;
+    F m = (F)(((M)x & 0x7fffff) | 0x3f000000);
+    M small = m < 0.707106781f;
+    e += small;
+    m = sel(small, m + m, m) - 1.0f;
+    F z = m * m, y = 7.0376836292e-2f * m - 1.1514610310e-1f;
+    y = y * m + 1.1676998740e-1f; y = y * m - 1.2420140846e-1f; y = y * m + 1.4249322787e-1f; y = y * m - 1.6668057665e-1f;
+    y = y * m + 2.0000714765e-1f; y = y * m - 2.4999993993e-1f; y = y * m + 3.3333331174e-1f;
+    F k = floats(e);
+    return m + (y * m * z - 2.12194440e-4f * k - 0.5f * z) + 0.693359375f * k;
+}

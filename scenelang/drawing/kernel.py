@@ -41,7 +41,8 @@ _SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
-    **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
+    **{"cones": ("iplpfppppppp", ""), "shade": ("ippiiiippp", "")},
+    "finish": ("ippiiiippppp", ""),
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -249,32 +250,42 @@ class Kernel:
         return result, near, met
 
     def shade(
-        self, tables: Tables, stage: Rows, way: Floats, until_s: float = NEVER
+        self, tables: Tables, stage: Rows, band: range, until_s: float = NEVER
     ) -> tuple[Floats, tuple[int, ...]]:
-        """Radiance and alpha (4, rows, across) along unit ways (3, rows, across) from the eye of a `STAGE`
-        row, of opaque objects with plain colours. Counts are of rays from lamps, of rays near what draws,
-        of points, of pairs of points and objects, and of rays that came to no end.
+        """Rows of a picture (rows, W, 3 or 4) in sRGB, with straight alpha where the background is
+        transparent, by a `STAGE` row. Counts are of rays from lamps, of rays near what draws, of points, of
+        pairs of points and objects, of pixels with more samples, of rays that came to no end, and of pixels
+        whose numbers are none.
         """
-        way = np.ascontiguousarray(way, np.float32)
-        _, rows, across = way.shape
-        result, counts = np.empty((4, rows, across), np.float32), np.zeros((2, 5), np.int64)
-        given = tables.scene.ctypes.data, stage.ctypes.data
+        width, height = int(stage["width"]), int(stage["height"])
+        near = range(max(band.start - 1, 0), min(band.stop + 1, height))
+        planes = 4 if int(tables.scene["hues"]) == 3 else 7
+        picture = np.empty((0 if stage["every"] else planes, len(near), width), np.float32)
+        result = np.empty((len(band), width, 4 if stage["transparent"] else 3), np.float32)
+        pixels, counts = np.empty(result.shape[:2], np.int32), np.zeros((2, 7), np.int64)
+        given = tables.scene.ctypes.data, stage.ctypes.data, near.start, near.stop
         scratch = np.empty(self._library.scratch(self.variant, given[0]), np.uint8)
-        each = max(1, PORTION // max(1, across) // 16) * 16
-        for top in range(0, rows, each):
-            check_time(until_s)
-            some = np.ascontiguousarray(way[:, top : top + each])
-            part = np.empty((4, *some.shape[1:]), np.float32)
-            places = some.ctypes.data, part.ctypes.data, part[3].ctypes.data, counts[0].ctypes.data
-            self._library.shade(self.variant, *given, part[0].size, across, *places, scratch.ctypes.data)
-            result[:, top : top + each] = part
-            counts[1] += counts[0]
+        last = counts[0].ctypes.data, scratch.ctypes.data
+        each = max(1, _portion(tables) // width // 16) * 16
+        for rows, call in (near if len(picture) else range(0), "shade"), (band, "finish"):
+            for top in rows[::each]:
+                check_time(until_s)
+                some, more = (top, min(top + each, rows.stop)), [picture.ctypes.data]
+                if call == "finish":
+                    more += [pixels.ctypes.data, result[top - band.start :].ctypes.data]
+                getattr(self._library, call)(self.variant, *given, *some, *more, *last)
+                counts[1] += counts[0]
         return result, tuple(counts[1].tolist())
+
+
+def _portion(tables: Tables) -> int:
+    """Rays, at least one, between which the time is checked."""
+    return max(PORTION * MANY // max(int(tables.scene["objects"]), MANY), PORTION >> 6)
 
 
 def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:
     """Parts of so many rays, at least one; raises `RenderError` as `check_time` does before each."""
-    size = max(PORTION * MANY // max(int(tables.scene["objects"]), MANY), PORTION >> 6)
+    size = _portion(tables)
     for begin in range(0, max(count, 1), size):
         check_time(until_s)
         yield slice(begin, min(begin + size, count))

@@ -37,6 +37,7 @@ from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, 
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.assets import grid_shape, texture_of
 from scenelang.drawing.neural.frames import MOST, read_skins
+from scenelang.drawing.solid.march import MarchSettings
 from scenelang.drawing.solid.network import BLEND, Formula, SolidCell, SolidNetwork, Wanted, element_box
 from scenelang.drawing.solid.norms import Norms
 
@@ -60,7 +61,7 @@ def _dtype(*kinds: str) -> np.dtype[Any]:
 
 OBJECT = _dtype(
     "f4 map[12] scale reach moved radius ball rate centre[3] extent low[3] high[3] amount frequency",
-    "f4 first wall last late look[12]",
+    "f4 first wall last late detail look[12]",
     "i4 flags ends decoder step steps texture depth path[15]",
 )
 STEP = _dtype("i4 kind", "f4 twirl rate map[12]")
@@ -73,11 +74,12 @@ SCENE = _dtype(
     "f4 sigma reach",
     "u8 object step decoder cell texture",
 )
-LAMP = _dtype("f4 at[3] power[3]")
+LAMP = _dtype("f4 at[3] power[3] radius")
 STAGE = _dtype(
-    "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift",
-    "i4 lamps grounded transparent glow",
-    "u8 lamp",
+    "f8 forward[3] right[3] up[3] px",
+    "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift contrast deep[3]",
+    "i4 lamps grounded transparent glow width height count every nodes",
+    "u8 lamp opaque hazy",
 )
 
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
@@ -372,18 +374,40 @@ def read_looks(network: SolidNetwork, parts: Parts, worn: Mask, draws: Mask) -> 
     return Looks(np.concatenate(rows), hues, len(switched), density, sigma, glowing, rough)
 
 
-def stage_rows(stage: Stage, gap: float, glowing: bool) -> tuple[Rows, Rows]:
-    """The `STAGE` row of direct light, and the `LAMP` rows that it points to; ``gap`` of `MarchSettings`."""
+def stage_rows(
+    stage: Stage,
+    canvas: tuple[int, int],
+    pace: MarchSettings,
+    samples: int = 0,
+    every: bool = False,
+    glow: int = 0,
+    shadows: Sequence[Rows] = (),
+) -> tuple[Rows, Rows]:
+    """The `STAGE` row of a picture under direct light, and the `LAMP` rows that it points to.
+
+    Pixels that differ from their neighbours, or ``every`` one, have so many samples. ``glow`` is the first
+    row of `Looks` that tells it, and ``shadows`` are `SCENE` rows of what is opaque and what is not, for
+    lamps of a radius.
+    """
     lamps = np.zeros(len(stage.lights), LAMP)
     for row, light in zip(lamps, stage.lights, strict=True):
-        row["at"], row["power"] = light.position, light.power * np.array(light.rgb)
-    result, ground = np.zeros((), STAGE), stage.ground
-    result["eye"], result["horizon"], result["zenith"] = stage.camera.eye, stage.horizon, stage.zenith
+        row["at"], row["power"], row["radius"] = light.position, light.power * np.array(light.rgb), light.radius
+    result, ground, camera = np.zeros((), STAGE), stage.ground, stage.camera
+    forward, right, up = np.array(camera.axes())
+    half = np.tan(camera.fov_rad / 2)
+    result["forward"], result["right"], result["up"] = forward / half, right, up
+    result["deep"], result["px"] = forward * half, 2 / min(canvas)
+    result["eye"], result["horizon"], result["zenith"] = camera.eye, stage.horizon, stage.zenith
     if ground is not None:
         result["grounded"], result["ground"], result["floor"] = 1, ground.rgb, ground.y
-    result["gap"], result["ambient"], result["fade"] = gap, AMBIENT, FADE
+    result["gap"], result["ambient"], result["fade"] = pace.gap, AMBIENT, FADE
+    result["contrast"], result["nodes"], result["glow"] = pace.contrast, pace.nodes, glow
     result["nearest"], result["lift"], result["transparent"] = NEAREST, LIFT, stage.transparent
-    result["glow"], result["lamps"], result["lamp"] = 3 * glowing, len(lamps), lamps.ctypes.data
+    result["width"], result["height"] = canvas
+    result["count"], result["every"] = samples, every
+    result["lamps"], result["lamp"] = len(lamps), lamps.ctypes.data
+    for name, row in zip(("opaque", "hazy"), shadows, strict=False):
+        result[name] = row.ctypes.data
     return result, lamps
 
 
@@ -412,7 +436,6 @@ class Tables:
         self.objects = read_objects(vectors, network.layout, groups, widths, reach)
         rows = self.objects.rows
         self._kept: list[Any] = []  # what tables point to
-        self.detail = np.zeros(count, np.float32)  # texels that a way of a world unit may cross, or 0
         self.edged = False  # whether a decoder shows edges, which rays may clip
         with network.xp.inference():
             draws = self.objects.flagged(DRAWS)
@@ -450,7 +473,7 @@ class Tables:
             assert paint is not None
             texture: Any = texture_of(network.xp, paint, frames[i], network.codes, light=True)
             row["place"] = np.array(texture.place.rows).reshape(-1)
-            self.detail[i] = texture.detail / self.objects.rows["scale"][i]
+            self.objects.rows["detail"][i] = texture.detail / self.objects.rows["scale"][i]
             if isinstance(paint.element, Gradient):
                 stops = paint.element.stops
                 row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR

@@ -91,8 +91,7 @@ class Lighting:
     def __init__(
         self, field: SolidField, stage: Stage, pace: MarchSettings = CAREFUL, around: Any = None
     ) -> None:
-        if field.edged:  # rays may clip these
-            pace = pace._replace(gap=pace.gap / 2)
+        pace = paced(field, pace)
         self.field, self.stage, self.xp, self.pace, self.around = field, stage, field.xp, pace, around
         like = field.network.codes
         twice = 2 if field.textures else 1  # colours, and plain ones in place of textures'
@@ -108,13 +107,7 @@ class Lighting:
         mirrors = field.rough and stage.sky is not None
         self._bare = placed(np.zeros((4 + 3 * twice if mirrors else 0, 1)))  # coat of what does not mirror
         self._forward = placed(forward * np.tan(stage.camera.fov_rad / 2))
-        reach = max([light.radius for light in stage.lights], default=0.0)
-        self.opaque = field.opaque((ASIDE + WIDE) * reach) if reach else field
-        self.hazy = field.hazy() if reach else field
-        # what the kernel shades by, where all light is direct, from points, and colours are plain
-        self.rows: Any = None
-        if field.shades and stage.sky is None and not reach:
-            self.rows = stage_rows(stage, self.pace.gap, field.glowing)
+        self.opaque, self.hazy = shadowing(field, stage)
         self.lamps = [
             Lamp(light, placed(light.position), placed([light.power * c for c in light.rgb] * twice))
             for light in stage.lights
@@ -585,28 +578,51 @@ def draw_solids(
     """Draw a field of solids: the picture, and what it took; arguments are those of `Run`, and ``count`` of
     samples of a pixel. Raises `ProgramError` for numbers out of all proportion, which no compiled scene has.
     """
-    width, height = canvas
-    lighting = Lighting(field, stage, MARCH_SETTINGS[samples])
+    (width, height), pace = canvas, MARCH_SETTINGS[samples]
     tell, lit = progress or (lambda _: None), 0.0  # how much of the share done is light from everywhere
-    if stage.sky is not None:
-        lighting.around = around = arriving(lighting)
-        tell(0.3)
-        around.look(canvas, partial(lighting.places, canvas))
-        tell(lit := 0.5)
-    out = np.empty((4, height, width), np.float32)
     rows = max(1, min(4 * TILE // (count * width), -(-height // (split or threads))))
     bands = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     costs: list[Work] = []
+    direct = stage.sky is None and field.shades
+    if direct:
+        every, pace = samples == "four" or min(canvas) == 1, paced(field, pace)
+        shadows = [part.tables.scene for part in shadowing(field, stage)]
+        more = count * (samples != "one"), every, field.hues * field.glowing, shadows
+        row, _lamps = stage_rows(stage, canvas, pace, *more)
+        out = np.empty((height, width, 4 if stage.transparent else 3), np.float32)
+    else:
+        lighting, out = Lighting(field, stage, pace), np.empty((4, height, width), np.float32)
+        if stage.sky is not None:
+            lighting.around = around = arriving(lighting)
+            tell(0.3)
+            around.look(canvas, partial(lighting.places, canvas))
+            tell(lit := 0.5)
 
     def one(band: range) -> None:
-        out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples, count)
+        if direct:
+            out[band.start : band.stop], work = field.shade(row, band)
+        else:
+            out[:, band.start : band.stop], work = _band(lighting, canvas, band, samples, count)
         costs.append(work)
         tell(lit + (1 - lit) * len(costs) / len(bands))
 
     field.xp.each(threads, one, bands)
+    if direct:
+        return out.view(Image), sum(costs, Work())
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
     return from_light(out, stage.transparent), sum(costs, Work())
+
+
+def paced(field: SolidField, pace: MarchSettings) -> MarchSettings:
+    """The pace at which a field is followed: rays may clip edges."""
+    return pace._replace(gap=pace.gap / 2) if field.edged else pace
+
+
+def shadowing(field: SolidField, stage: Stage) -> tuple[SolidField, SolidField]:
+    """What is opaque alone, and what is not, as lamps of a radius see it; the field itself without such."""
+    reach = max([light.radius for light in stage.lights], default=0.0)
+    return (field.opaque((ASIDE + WIDE) * reach), field.hazy()) if reach else (field, field)
 
 
 def _band(
@@ -661,9 +677,6 @@ def _shade(
 ) -> tuple[np.ndarray, Work]:
     """Radiance, alpha and plain radiance (7, …) at places of the picture; the rest as of `Lighting.shade`."""
     xp, way = lighting.xp, directions(lighting.stage.camera, canvas, x, y)
-    if lighting.rows is not None:
-        light, shaded = lighting.field.shade(lighting.rows, way)
-        return np.concatenate([light, light[:3]]), shaded
     with xp.inference():
         shade = lighting.shade(xp.array(way.reshape(3, -1), lighting.field.network.codes), px, centres)
         result = xp.to_numpy(xp.concat([shade.radiance, shade.alpha[None], shade.plain], 0))

@@ -9,7 +9,7 @@ import numpy as np
 
 from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, SUBTRACT, UNION, read_groups
-from scenelang.compiler.program import Paint
+from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.kernel import Asked, load_kernel
 from scenelang.drawing.solid.march import HALVINGS, STEPS, Pieces, Trail, Work
@@ -53,7 +53,7 @@ class SolidField:
         self.looks, self.density = xp.array(looks.register, like), xp.array(looks.density, like)
         self.hues, self.switched, self.sigma = looks.hues, looks.switched, looks.sigma
         self.glowing, self.rough = looks.glowing, looks.rough
-        self.edged, self.detail = tables.edged, tables.detail
+        self.edged, self.detail = tables.edged, tables.objects.rows["detail"]
         self.textures = self.hues > 3
         self.skinned = self.objects.flagged(SKINNED)
         self.draws = bool(self.objects.flagged(DRAWS).all())  # whether all objects draw
@@ -131,16 +131,18 @@ class SolidField:
         share, near, met = load_kernel().cones(self.tables, at, radius, p, n, self.network.until_s)
         return share, Work(near=near, met=met)
 
-    @property
-    def shades(self) -> bool:
-        """Whether `shade` knows all that there is: opaque things with plain colours."""
-        return not (self.media or self.textures)
+    shades = True  # whether `shade` can be asked
 
-    def shade(self, rows: tuple[Rows, Rows], way: Array) -> tuple[Array, Work]:
-        """Radiance and alpha (4, …) along unit ways (3, rows, across) from an eye, by `stage_rows`."""
-        light, counts = load_kernel().shade(self.tables, rows[0], way, self.network.until_s)
-        lights, near, steps, met, lost = counts
-        return light, Work(light[0].size, lights, near, steps, met, lost=lost)
+    def shade(self, stage: Rows, band: range) -> tuple[Array, Work]:
+        """Rows of a picture (rows, W, 3 or 4) as `Kernel.shade`; raises `ProgramError` for numbers that are
+        none.
+        """
+        picture, counts = load_kernel().shade(self.tables, stage, band, self.network.until_s)
+        lights, near, steps, met, refined, lost, bad = counts
+        if bad:
+            raise ProgramError("numbers that the network cannot draw with")
+        rays = picture[..., 0].size * (stage["every"] == 0) + refined * int(stage["count"])
+        return picture, Work(int(rays), lights, near, steps, met, refined, lost)
 
     def opaque(self, reach: float) -> SolidField:
         """The field of what is opaque alone, with distances up to a reach around it.
