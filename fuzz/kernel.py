@@ -22,6 +22,7 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.closed import field_of
 from scenelang.drawing.kernel import Kernel
+from scenelang.drawing.solid.march import MARCH_SETTINGS
 from scenelang.drawing.tables import Tables, stage_rows
 from scenelang.language.evaluation import load
 from scenelang.language.reports import SceneError
@@ -83,11 +84,15 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
         assert (np.diff(trails.pieces["ray"]) >= 0).all()
     lamp, radius = rng.normal(size=3) * 10.0 ** rng.integers(-1, 2), float(rng.choice([0.0, 0.1, 3.0, 1e9]))
     kernel.cones(tables, lamp.astype(np.float32), radius, p, way)
-    if program.stage is not None and not (tables.scene["media"] or tables.looks.hues > 3):
-        stage, lamps = stage_rows(program.stage, gap, tables.looks.glowing)
+    if program.stage is not None:
+        width, height = rng.choice([1, 7, 20], 2).tolist()
+        pace, glow = MARCH_SETTINGS["adaptive"]._replace(gap=gap), tables.looks.hues * tables.looks.glowing
+        shown, (count, every) = [tables] * 2, (int(rng.choice([0, 4, 9, 400])), bool(rng.random() < 0.3))
+        stage, (lamps, _) = stage_rows(
+            program.stage, (width, height), pace, count, every and count > 0, glow, shown
+        )
         stage["eye"], lamps["at"] = p[:, 0], p[:, 1 : 1 + len(lamps)].T
-        across = int(rng.choice([1, 20, POINTS]))
-        kernel.shade(tables, stage, way[:, : POINTS // across * across].reshape(3, -1, across))
+        kernel.shade(tables, stage, range(height))
 
 
 def programs() -> list[Program]:

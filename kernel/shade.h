@@ -139,7 +139,7 @@ ONCE static Surface surface(Job *j, int n, V way, F t, M hit, M soft) {
     r.g = scaled(r.g, sel(towards > 0.0f, all(-1), all(1)) / max2(root(dot(r.g, r.g)), all(1e-12f)));
     if (j->means && j->sheets > 1) {
         M some = ints(0);
-        for (int k = 0; k < n; k++) if (j->slot[k].object->texture >= 0) some |= (j->slot[k].begin <= r.t + INTO) & (r.t - INTO <= j->slot[k].end);
+        for (int k = 0; k < n; k++) if (j->slot[k].object->texture >= 0) some |= (j->slot[k].begin <= r.t + gap) & (r.t - gap <= j->slot[k].end);
         some &= hit;
         if (any(some)) r.colour[0] = choose(some, sampled(j, &r, way, some, soft), r.colour[0]);
     }

@@ -381,17 +381,22 @@ def stage_rows(
     samples: int = 0,
     every: bool = False,
     glow: int = 0,
-    shadows: Sequence[Rows] = (),
-) -> tuple[Rows, Rows]:
-    """The `STAGE` row of a picture under direct light, and the `LAMP` rows that it points to.
+    shadows: Sequence[Tables] = (),
+) -> tuple[Rows, tuple[Rows, Sequence[Tables]]]:
+    """The `STAGE` row of a picture under direct light, and the `LAMP` rows and tables that it points to.
 
     Pixels that differ from their neighbours, or ``every`` one, have so many samples. ``glow`` is the first
-    row of `Looks` that tells it, and ``shadows`` are `SCENE` rows of what is opaque and what is not, for
+    row of `Looks` that tells it, and ``shadows`` are the tables of what is opaque and of what is not, for
     lamps of a radius.
     """
+    assert len(shadows) == 2 or not any(light.radius for light in stage.lights)
     lamps = np.zeros(len(stage.lights), LAMP)
     for row, light in zip(lamps, stage.lights, strict=True):
-        row["at"], row["power"], row["radius"] = light.position, light.power * np.array(light.rgb), light.radius
+        row["at"], row["power"], row["radius"] = (
+            light.position,
+            light.power * np.array(light.rgb),
+            light.radius,
+        )
     result, ground, camera = np.zeros((), STAGE), stage.ground, stage.camera
     forward, right, up = np.array(camera.axes())
     half = np.tan(camera.fov_rad / 2)
@@ -406,9 +411,9 @@ def stage_rows(
     result["width"], result["height"] = canvas
     result["count"], result["every"] = samples, every
     result["lamps"], result["lamp"] = len(lamps), lamps.ctypes.data
-    for name, row in zip(("opaque", "hazy"), shadows, strict=False):
-        result[name] = row.ctypes.data
-    return result, lamps
+    for name, tables in zip(("opaque", "hazy"), shadows, strict=False):
+        result[name] = tables.scene.ctypes.data
+    return result, (lamps, shadows)
 
 
 class Tables:

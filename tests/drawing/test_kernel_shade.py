@@ -11,81 +11,101 @@ import scenelang as nsg
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.spaces import Camera, Ground, Light, Stage
 from scenelang.drawing.closed import field_of
+from scenelang.drawing.image import decoded, from_light
 from scenelang.drawing.kernel import load_kernel
-from scenelang.drawing.solid.draw import Lighting, directions
+from scenelang.drawing.solid.draw import Lighting, _band, draw_solids, shadowing
 from scenelang.drawing.solid.field import SolidField
+from scenelang.drawing.solid.march import CAREFUL, MARCH_SETTINGS
 from scenelang.drawing.tables import stage_rows
 from scenelang.language.evaluation import load
 from tests.drawing.solids import Object, field, scaled
 
 ROOT = Path(__file__).parents[2]
 KERNEL = load_kernel()
-NAMES = ("armillary", "bracket", "castle", "chess", "robot", "saturn", "snowman", "stones")
+PLAIN = ("armillary", "bracket", "castle", "chess", "robot", "saturn", "snowman", "stones")
+TEXTURES, MEDIA, SOFT = ("turned", "floor", "lantern"), ("clouds", "icecream"), ("teatime",)
 SIDE = 48
 
 
-def lit(name: str) -> tuple[Lighting, np.ndarray]:
-    """An example's light, and ways of rays through pixels (3, H, W)."""
+def example(name: str) -> tuple[SolidField, Stage]:
     program = compile_scene(load(ROOT / f"examples/{name}.nsg"))
     assert program.stage is not None
     net = field_of(program, False)
     solids = SolidField(net, program.vectors, program.tokens, program.brought(), program.paints())  # type: ignore[arg-type]
-    x = np.arange(SIDE) + 0.5
-    return Lighting(solids, program.stage), directions(program.stage.camera, (SIDE, SIDE), x, x[:, None])
+    return solids, program.stage
 
 
-@pytest.mark.parametrize("name", NAMES)
-def test_light_is_that_over_arrays(name: str) -> None:
+@pytest.mark.parametrize("samples", ["one", "adaptive"])
+@pytest.mark.parametrize("name", [*PLAIN, *TEXTURES, *MEDIA, *SOFT])
+def test_light_is_that_over_arrays(name: str, samples: str) -> None:
     """But at edges, where the surface that is met is another."""
-    lighting, way = lit(name)
-    found, work = lighting.field.shade(lighting.rows, way)
-    shade = lighting.shade(way.reshape(3, -1))
-    off = abs(found[:3].reshape(3, -1) - shade.radiance).max(0)
-    assert np.median(off) < 1e-6
-    assert (off > 2e-3).mean() < 4e-3
-    assert (found[3].reshape(-1) == shade.alpha).all()
-    assert work.lights == pytest.approx(shade.work.lights, rel=0.1)
-    assert work.met == pytest.approx(shade.work.met, rel=0.1)
-    assert (work.rays, work.lost) == (SIDE * SIDE, 0)
+    solids, stage = example(name)
+    found, work = draw_solids(solids, stage, (SIDE, SIDE), samples=samples)
+    light, others = _band(
+        Lighting(solids, stage, MARCH_SETTINGS[samples]), (SIDE, SIDE), range(SIDE), samples, 4
+    )
+    exact = from_light(light, stage.transparent)
+    off = abs(np.asarray(found) - np.asarray(exact)).max(2)
+    assert np.median(off) < 2e-6
+    assert (off > 4e-3).mean() < 4e-3
+    assert work.refined == pytest.approx(others.refined, abs=2)
+    assert work.lost == 0
 
 
-def test_rays_do_not_depend_on_those_beside() -> None:
-    """The same bytes in any order, in rows or not, and by processors with AVX2 and AVX-512."""
-    lighting, way = lit("robot")
-    whole = lighting.field.shade(lighting.rows, way)[0].reshape(4, -1)
-    order = np.random.default_rng(0).permutation(SIDE * SIDE)
-    for shape in ((SIDE, SIDE), (SIDE * SIDE // 4, 4), (1, SIDE * SIDE)):
-        mixed = way.reshape(3, -1)[:, order].reshape(3, *shape)
-        found = lighting.field.shade(lighting.rows, mixed)[0].reshape(4, -1)
-        assert found.tobytes() == np.ascontiguousarray(whole[:, order]).tobytes()
+@pytest.mark.parametrize("name", ["robot", "clouds", "floor", "teatime"])
+def test_rows_do_not_depend_on_bands(name: str) -> None:
+    """The same bytes however rows are cut, in threads, and by processors with AVX2 and AVX-512."""
+    solids, stage = example(name)
+    whole, work = draw_solids(solids, stage, (SIDE, SIDE))
+    assert work.refined > 50
+    for cuts in ({"split": 5}, {"threads": 3}, {"split": SIDE}):
+        assert draw_solids(solids, stage, (SIDE, SIDE), **cuts)[0].tobytes() == whole.tobytes()  # type: ignore[arg-type]
 
 
 def test_variants_agree(monkeypatch: pytest.MonkeyPatch) -> None:
-    lighting, way = lit("bracket")
-    whole = lighting.field.shade(lighting.rows, way)[0]
+    solids, stage = example("bracket")
+    whole = draw_solids(solids, stage, (SIDE, SIDE))[0]
     newest = KERNEL.variant
     for variant in range(newest):
         monkeypatch.setattr(KERNEL, "variant", variant)
-        other = lighting.field.shade(lighting.rows, way)[0]
-        assert (abs(other - whole).max(0) > 1 / 255).mean() < 2e-3
+        other = draw_solids(solids, stage, (SIDE, SIDE))[0]
+        assert (abs(other - whole).max(2) > 1 / 255).mean() < 2e-3
         if variant:
             assert other.tobytes() == whole.tobytes()
+
+
+@pytest.mark.parametrize("count", [4, 9, 400])
+def test_samples_are_means_over_their_pixels(count: int) -> None:
+    """Of a sky that brightens upwards, whose light is 1 in the middle at most, over every pixel."""
+    stage = Stage(Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), (), None, (0.1, 0.2, 0.3), (0.9, 0.4, 0.1))
+    solids, side = field([Object("sphere", (scaled(0.01),))]), 8
+    row, _kept = stage_rows(stage, (side, side), CAREFUL, count, True)
+    found = decoded(solids.shade(row, range(side))[0][:3, :2])
+    n = int(np.sqrt(count))
+    places = (np.arange(side * n) + 0.5) / n - side / 2
+    half, px = np.tan(stage.camera.fov_rad / 2), 2 / side
+    x, y = np.meshgrid(places * px * half, -places * px * half)
+    high = np.clip(2 * y / np.sqrt(1 + x * x + y * y), 0, 1).reshape(side, n, side, n).mean((1, 3))[:3, :2]
+    low, top = np.array(stage.horizon), np.array(stage.zenith)
+    assert found == pytest.approx(low + (top - low) * high[..., None], abs=1e-5)
 
 
 def test_a_ball_that_glows_over_the_ground() -> None:
     """By closed forms: what it gives off, ambient light and that of two lamps, and the ground's fade."""
     light, other = Light((0.0, 0.0, 9.0), 30.0, (1.0, 0.5, 0.2)), Light((0.0, 3.0, 3.0), 9.0)
-    stage = Stage(Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0)), (light, other), Ground(-3.0, (0.5, 0.4, 0.3)))
+    camera = Camera((0.0, 0.0, 6.0), (0.0, 0.0, 0.0), 2 * np.arctan(0.375))
+    stage = Stage(camera, (light, other), Ground(-3.0, (0.5, 0.4, 0.3)))
     solids = field([Object("sphere", (scaled(0.8),), rgb=(0.6, 0.7, 0.2))])
-    way = np.float32([[0, 0, -1], [0, -0.6, -0.8], [0, 0.6, -0.8]]).T[:, None]
-    found = solids.shade(stage_rows(stage, 0.009, False), way)[0][:, 0]
+    # three pixels, whose rays go along (0, 0.6, -0.8), (0, 0, -1) and (0, -0.6, -0.8)
+    row, _kept = stage_rows(stage, (1, 3), CAREFUL)
+    top, middle, bottom = decoded(solids.shade(row, range(3))[0][:, 0])
     p, n = np.array([0.0, 0.0, 0.8]), np.array([0.0, 0.0, 1.0])
     exact = 0.12 * np.array([0.6, 0.7, 0.2])
     for lamp in stage.lights:
         to = np.array(lamp.position) - p
         r = np.linalg.norm(to)
         exact += lamp.power * np.array(lamp.rgb) * np.array([0.6, 0.7, 0.2]) * (n @ to) / r**3
-    assert found[:3, 0] == pytest.approx(exact, rel=2e-3)
+    assert middle == pytest.approx(exact, rel=2e-3)
     at = np.array([0.0, -3.0, 2.0])
     kept = np.exp(-(at[2] ** 2) / 64)
     floor, level = kept * np.array([0.5, 0.4, 0.3]), np.array([0.0, 1.0, 0.0])
@@ -95,8 +115,8 @@ def test_a_ball_that_glows_over_the_ground() -> None:
         r = np.linalg.norm(to)
         clear = np.linalg.norm(np.cross(to, -at)) / r > 0.8 or to @ -at < 0
         exact += clear * lamp.power * np.array(lamp.rgb) * floor * (level @ to) / r**3
-    assert found[:3, 1] == pytest.approx(exact, rel=1e-3)
-    assert found[:3, 2] == pytest.approx(np.array(stage.zenith), rel=1e-5)
+    assert bottom == pytest.approx(exact, rel=1e-3)
+    assert top == pytest.approx(np.array(stage.zenith), rel=1e-5)
 
 
 def test_without_a_background_what_is_met_covers() -> None:

@@ -585,10 +585,10 @@ def draw_solids(
     costs: list[Work] = []
     direct = stage.sky is None and field.shades
     if direct:
-        every, pace = samples == "four" or min(canvas) == 1, paced(field, pace)
-        shadows = [part.tables.scene for part in shadowing(field, stage)]
+        every, pace = samples == "four" or (samples != "one" and min(canvas) == 1), paced(field, pace)
+        shadows = [part.tables for part in shadowing(field, stage)]
         more = count * (samples != "one"), every, field.hues * field.glowing, shadows
-        row, _lamps = stage_rows(stage, canvas, pace, *more)
+        row, _kept = stage_rows(stage, canvas, pace, *more)
         out = np.empty((height, width, 4 if stage.transparent else 3), np.float32)
     else:
         lighting, out = Lighting(field, stage, pace), np.empty((4, height, width), np.float32)
