@@ -13,7 +13,7 @@ from scenelang.compiler.spaces import Camera, Ground, Light, Stage
 from scenelang.drawing.closed import field_of
 from scenelang.drawing.image import decoded, from_light
 from scenelang.drawing.kernel import load_kernel
-from scenelang.drawing.solid.draw import Lighting, _band, draw_solids, shadowing
+from scenelang.drawing.solid.draw import Lighting, _band, draw_solids
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import CAREFUL, MARCH_SETTINGS
 from scenelang.drawing.tables import stage_rows
