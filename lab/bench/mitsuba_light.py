@@ -14,7 +14,7 @@ import numpy as np
 
 from lab.bench.mitsuba_scenes import SURFACES, diffuse, mesh, sensor, worn
 from scenelang.compiler.graph import Graph, Leaf, leaves
-from scenelang.compiler.spaces import FADE, Stage
+from scenelang.compiler.spaces import Stage
 from scenelang.compiler.steps import Affine, composed
 from scenelang.drawing.exact.field import placed_leaves
 
@@ -47,7 +47,9 @@ def exported(graph: Graph, guides: bool = False) -> Any:
     scene |= {"integrator": integrator, "sensor": sensor(stage, graph.canvas, type="multijitter")}
     if stage.ground is not None:
         x = (np.arange(512) + 0.5) / 256 - 1
-        fade = np.exp(-(_FAR**2) * (x * x + (x * x)[:, None]) / FADE)[..., None].astype(np.float32)
+        fade = np.exp(-(_FAR**2) * (x * x + (x * x)[:, None]) / stage.ground.fade**2)[..., None].astype(
+            np.float32
+        )
         mask = {"type": "mask", "bsdf": diffuse(stage.ground.rgb)}
         mask["opacity"] = {"type": "bitmap", "bitmap": mi.Bitmap(fade), "raw": True, "wrap_mode": "clamp"}
         flat = mi.ScalarTransform4f().translate([0, stage.ground.y, 0]).rotate([1, 0, 0], -90).scale(_FAR)

@@ -289,7 +289,7 @@ def follow(w: World, o: Any, d: Any, eye: bool, known: float, how: int, room: Ro
         light[3] = 1.0
         kind, alpha, n, lift, share = DIFFUSE, 0.0, (0.0, 1.0, 0.0), LIFT, 1.0
         if ending == ENDS:
-            clear = math.exp(-(p[0] * p[0] + p[2] * p[2]) / FADE)
+            clear = math.exp(-(p[0] * p[0] + p[2] * p[2]) / (FADE * FADE))
             gains(light, through, 1.0 - clear, sky)
             through = times(through, clear, ONES)
             rgb, cap = (w.ground[1], w.ground[2], w.ground[3]), CAPS[0]

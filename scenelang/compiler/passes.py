@@ -181,14 +181,6 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
         _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
-    view = "view cut" if any(row.cuts or row.op == "subtract" for row in rows) else "view"
-    if rows and graph.stage is not None and view in trained:
-        camera = graph.stage.camera
-        reach = dist(camera.eye, camera.target) * tan(camera.fov_rad / 2)
-        if not trained[view][0] <= reach <= trained[view][1]:
-            _warn(
-                context, "W0515", view, f"a view of {reach:.3g} from its middle to its edge is", rows[0].leaf
-            )
     if graph.stage is not None and graph.stage.sky is not None and context.whole:
         _check_light(rows, measures, graph, graph.stage, context)
     return graph

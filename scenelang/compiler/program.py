@@ -35,7 +35,7 @@ from scenelang.compiler.lifting import LAYOUTS, WIDTH, Layout
 from scenelang.compiler.manifest import ALIASES, available, load_manifest
 from scenelang.compiler.spaces import Stage, read_stage, stage_data
 from scenelang.language.diagnostics import plural
-from scenelang.language.nodes import MOST, SAMPLES
+from scenelang.language.nodes import DENSEST, MOST, SAMPLES
 from scenelang.language.words import TOKENS
 
 GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
@@ -376,8 +376,8 @@ def _light_fault(program: Program) -> str | None:
     if program.stage is None or not program.lit:
         return None
     parts = LAYOUTS[3].unpack(program.vectors)
-    if not ((parts.density >= 0.0) & (parts.density <= 100.0)).all():
-        return "a density outside 0..100"
+    if not ((parts.density >= 0.0) & (parts.density <= DENSEST)).all():
+        return f"a density outside 0..{DENSEST:,.0f}"
     rough = abs(parts.roughness[parts.roughness != 0.0])
     if not ((rough >= np.float32(0.05)) & (rough <= 1.0)).all():
         return "a roughness outside 0.05..1"

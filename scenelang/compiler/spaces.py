@@ -21,7 +21,8 @@ turns each point by an angle that is bounded over any sector about the origin, i
 from __future__ import annotations
 
 from collections.abc import Sequence
-from math import asin, atan, atan2, cos, hypot, inf, pi, sqrt, tau
+from dataclasses import replace
+from math import asin, atan, atan2, cos, dist, hypot, inf, pi, sqrt, tan, tau
 from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
@@ -56,7 +57,7 @@ AMBIENT = (0.12, 0.06)
 """Ambient light on a surface of normal n: ``AMBIENT[0] + AMBIENT[1] n.y``; on media the first alone."""
 
 EXTINCTION = 3.0  # of media, per world unit
-FADE = 64.0  # the ground fades into the horizon by exp(-(x² + z²) / FADE)
+FADE = 8.0  # distance from the y axis over which the ground fades, unless it says another
 NEAREST = 1e-3  # the light counts as at least this far away
 LIFT = 1e-4  # how far off its surface a ray to the light starts
 
@@ -109,10 +110,14 @@ class Sky(Record):
 
 
 class Ground(Record):
-    """A diffuse plane at height ``y``."""
+    """A diffuse plane at height ``y``, which fades into the horizon by exp(-(x² + z²) / fade²)."""
 
     y: float = -1.0
     rgb: Triple = (0.50, 0.48, 0.45)
+    fade: float = FADE
+
+    def __repr__(self) -> str:
+        return _said(self)
 
 
 class Stage(Record):
@@ -134,6 +139,29 @@ class Stage(Record):
         """Whether one point light lights it, and no sky: what stages were before there was more."""
         return self.sky is None and len(self.lights) == 1 and not self.lights[0].radius
 
+    @property
+    def size(self) -> float:
+        """World units from the middle of the view to its nearer edges, where the camera looks at."""
+        return dist(self.camera.eye, self.camera.target) * tan(self.camera.fov_rad / 2)
+
+    def scaled(self, by: float) -> Stage:
+        """The same picture with all lengths of the world times a number."""
+
+        def moved(p: Triple) -> Triple:
+            return p[0] * by, p[1] * by, p[2] * by
+
+        camera, ground = self.camera, self.ground
+        lights = [
+            replace(lamp, position=moved(lamp.position), power=lamp.power * by * by, radius=lamp.radius * by)
+            for lamp in self.lights
+        ]
+        return replace(
+            self,
+            camera=replace(camera, eye=moved(camera.eye), target=moved(camera.target)),
+            lights=tuple(lights),
+            ground=ground and replace(ground, y=ground.y * by, fade=ground.fade * by),
+        )
+
     def __repr__(self) -> str:
         return _said(self)
 
@@ -154,6 +182,8 @@ def _fields(part: Record) -> dict[str, Any]:
     fields = {name: getattr(part, name) for name in names}
     if isinstance(part, Light) and not part.radius:
         del fields["radius"]
+    if isinstance(part, Ground) and part.fade == FADE:
+        del fields["fade"]
     if isinstance(part, Stage) and part.plain:
         del fields["sky"]
         (light,) = part.lights
@@ -194,8 +224,8 @@ def _read(usual: Any, value: Any, name: str) -> Any:
     usual = Sky() if name == "sky" else usual
     if isinstance(usual, Record):
         names: tuple[str, ...] = usual.__match_args__
-        if isinstance(usual, Light) and isinstance(value, dict):
-            value = {"radius": 0.0, **value}
+        if isinstance(usual, Light | Ground) and isinstance(value, dict):  # what was not there at first
+            value = {names[-1]: getattr(usual, names[-1]), **value}
         if not isinstance(value, dict) or value.keys() != set(names):
             raise ValueError(f"`{name}` has fields missing or unknown")
         return type(usual)(**{n: _read(getattr(usual, n), value[n], n) for n in names})
@@ -220,7 +250,8 @@ def stage_of(scene: Scene) -> Stage:
         lights = tuple([Light(at.position, at.power, decoded(at.color), at.radius) for at in lamps])
     plane = None if ground is None else Ground()
     if ground is not None and ground != "default":
-        plane = Ground(ground.y, Ground().rgb if ground.color == "default" else decoded(ground.color))
+        colour = Ground().rgb if ground.color == "default" else decoded(ground.color)
+        plane = Ground(ground.y, colour, ground.fade)
     horizon, zenith, own = HORIZON, ZENITH, scene.sky
     if painted := backdrop is not None and backdrop != "default":
         horizon = zenith = decoded(backdrop)

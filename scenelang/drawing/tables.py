@@ -33,7 +33,7 @@ from scenelang.compiler.groups import (
 from scenelang.compiler.lifting import LAYOUTS, STRENGTHS, Layout, Parts
 from scenelang.compiler.program import STEPS as COLOUR_STEPS
 from scenelang.compiler.program import Paint, ProgramError
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, LIFT, NEAREST, Stage
 from scenelang.drawing.arrays import Smooth
 from scenelang.drawing.neural.assets import grid_shape, texture_of
 from scenelang.drawing.neural.frames import MOST, read_skins
@@ -405,7 +405,8 @@ def stage_rows(
     result["eye"], result["horizon"], result["zenith"] = camera.eye, stage.horizon, stage.zenith
     if ground is not None:
         result["grounded"], result["ground"], result["floor"] = 1, ground.rgb, ground.y
-    result["gap"], result["ambient"], result["fade"] = pace.gap, AMBIENT, FADE
+        result["fade"] = ground.fade**2
+    result["gap"], result["ambient"] = pace.gap, AMBIENT
     result["contrast"], result["nodes"], result["glow"] = pace.contrast, pace.nodes, glow
     result["nearest"], result["lift"], result["transparent"] = NEAREST, LIFT, stage.transparent
     result["width"], result["height"] = canvas

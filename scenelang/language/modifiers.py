@@ -144,10 +144,11 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "side": lambda value, at: int(_side(value, at)),
     "share": _within(lambda share: 0.0 <= share <= 1.0, "an opacity of {} is outside 0..1"),
     "power": _power,
+    "distance": _within(lambda far: far > 0.0, "a distance of {} is not positive"),
     "extent": _within(lambda radius: radius >= 0.0, "a radius of {} is negative"),
     "density": _within(
-        lambda s: 0.0 < s <= 100.0,
-        "a density of {} is not above 0 and at most 100",
+        lambda s: 0.0 < s <= nodes.DENSEST,
+        f"a density of {{}} is not above 0 and at most {nodes.DENSEST:,.0f}",
         "in mist of 3 a third of a unit lets 37 % of the light through",
     ),
     "roughness": _within(lambda r: 0.05 <= r <= 1.0, "a roughness of {} is outside 0.05..1"),

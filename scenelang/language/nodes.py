@@ -39,6 +39,8 @@ MOST: Final = 1e12
 """The largest number of a stage: float32 holds what is computed of it."""
 LAMPS: Final = 8
 """The most lights of a scene."""
+DENSEST: Final = 1e6
+"""The most extinction of a medium, per world unit."""
 
 
 def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str] | None:
@@ -497,14 +499,17 @@ Lights = Annotated[
 
 
 class Ground(Frozen):
-    """A diffuse plane at height ``y``; ``color`` is as written, or the default's."""
+    """A diffuse plane at height ``y``; ``color`` is as written, or the default's. It fades into the horizon
+    by exp(-(x² + z²) / fade²).
+    """
 
     y: Place = -1.0
     color: Annotated[Annotated[Opaque, STATED] | Unsaid, EITHER] = "default"
+    fade: Annotated[Finite, Field(gt=0, le=MOST)] = 8.0
 
     if TYPE_CHECKING:
 
-        def __init__(self, y: float = ..., color: Triple | str = ...) -> None: ...
+        def __init__(self, y: float = ..., color: Triple | str = ..., fade: float = ...) -> None: ...
 
 
 class Sky(Frozen):
@@ -558,7 +563,7 @@ class Material(Brief):
     opacity: Annotated[Share, Field(description="2D; 0 shows all that lies behind, 1 hides it")] = 1.0
     glow: Annotated[Glow | None, Field(description="light that it sends out")] = None
     density: Annotated[
-        Finite | None, Field(gt=0, le=100, description="of volumetric, per world unit; null: 3")
+        Finite | None, Field(gt=0, le=DENSEST, description="of volumetric, per world unit; null: 3")
     ] = None
     roughness: Annotated[
         Finite | None, Field(ge=0.05, le=1, description="of glossy and metal; null: 0.3")

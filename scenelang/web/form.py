@@ -20,7 +20,7 @@ from scenelang.assets.element import Element, Gradient
 from scenelang.assets.element_file import load_textures, name_of
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.spaces import Sky, Stage, stage_data
+from scenelang.compiler.spaces import FADE, Sky, Stage, stage_data
 from scenelang.language import scene, words
 from scenelang.language import tree as nodes
 from scenelang.language.builder import FileContext, Site
@@ -542,10 +542,11 @@ def form_of(
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
     usual, fields = {**stage_data(Stage()), "sky": stage_data(Sky())}, {}
-    usual["light"]["radius"] = 0.0
+    usual["light"]["radius"], usual["ground"]["fade"] = 0.0, FADE
     for name, word in words.STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
-        ranges = [(one.get("minimum", -MOST), one.get("maximum", MOST)) for one in schema]
+        least = [one.get("minimum", one.get("exclusiveMinimum", -MOST)) for one in schema]
+        ranges = [(low, one.get("maximum", MOST)) for low, one in zip(least, schema, strict=True)]
         columns = zip(usual[name], word.kinds, ranges, strict=True)
         fields[name] = [(field, kind, *ends) for field, kind, ends in columns]
     return {"usual": usual, "fields": fields}

@@ -25,7 +25,7 @@ from scenelang.web.arrays import ArrayStore, web
 FILES: Final = ("solid.glsl", "fold.glsl", "rays.glsl", "look.glsl", "lamps.glsl", "light.glsl")
 """Files of ``viewer/``, in order."""
 _CONSTANTS: Final = {
-    **{"EMPTY": EMPTY, "RADIUS": RADIUS, "EXTINCTION": EXTINCTION, "FADE": FADE, "NEAREST": NEAREST},
+    **{"EMPTY": EMPTY, "RADIUS": RADIUS, "EXTINCTION": EXTINCTION, "NEAREST": NEAREST},
     **{"LIFT": LIFT, "AMBIENT_EVEN": AMBIENT[0], "AMBIENT_UP": AMBIENT[1], "HARD": HARD},
 }
 
@@ -44,6 +44,7 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     usual = stage_data(Stage())
     usual["lights"] = [{**usual.pop("light"), "radius": 0.0}]
+    usual["ground"]["fade"] = FADE
     parts += ["#ifndef LAMPS\n#define LAMPS 1\n#endif", _struct("Stage", usual)]
     said = "of each join what is made of a distance, a bump; then lines"
     parts += [f"uniform vec4 cells[{len(cells)}]; // {said}"]

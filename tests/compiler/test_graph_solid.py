@@ -243,7 +243,7 @@ def test_constants_are_those_of_the_language() -> None:
     written = Stage(camera, (light,), Ground(-1, (0.50, 0.48, 0.45)), (0.80, 0.86, 0.92), (0.30, 0.50, 0.85))
     assert Stage() == replace(written, camera=replace(camera, fov_rad=Camera().fov_rad))
     assert Camera().fov_rad == pytest.approx(camera.fov_rad, abs=1e-6)
-    assert (spaces.AMBIENT, spaces.EXTINCTION, spaces.FADE) == ((0.12, 0.06), 3, 64)
+    assert (spaces.AMBIENT, spaces.EXTINCTION, spaces.FADE) == ((0.12, 0.06), 3, 8)
     assert (spaces.NEAREST, spaces.LIFT) == (1e-3, 1e-4)
 
 

@@ -17,7 +17,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenelang.compiler.graph import Graph, Node, leaves
-from scenelang.compiler.spaces import FADE, LIFT, Light, Stage
+from scenelang.compiler.spaces import LIFT, Light, Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
 from scenelang.drawing.exact.outline import of_curves
 from scenelang.drawing.exact.solid import (
@@ -35,6 +35,7 @@ from scenelang.drawing.exact.solid import (
     ways,
 )
 from scenelang.drawing.image import DEEP, Image, Outputs, from_samples
+from scenelang.drawing.size import sized_root
 
 
 def reference_image(
@@ -112,15 +113,16 @@ def graph_outputs(graph: Graph, brought: Brought | None = None) -> Outputs:
             result[5][part] = covered.mean((1, 3))
         return Outputs(object=result[4].astype(np.int32), alpha=result[5].astype(np.float32))
     step = max(1, TILE // (graph.samples * width))
-    field = ExactField(graph.root, brought)
+    root, stage, by = sized_root(graph.root, graph.stage)
+    field = ExactField(root, brought)
     for top in range(0, height, step):
         rows = range(top, min(top + step, height))
-        centres = _shown(field, graph.stage, ways(graph.stage, graph.canvas, rows, 1))
-        view = seen_along(field, graph.stage, ways(graph.stage, graph.canvas, rows, side))[1]
+        centres = _shown(field, stage, ways(stage, graph.canvas, rows, 1))
+        view = seen_along(field, stage, ways(stage, graph.canvas, rows, side))[1]
         alpha = 1.0 - (view.last != OPAQUE) * np.exp(-view.total)  # the share that objects hide
         result[:5, rows.start : rows.stop] = centres.reshape(-1, len(rows), width)
         result[5, rows.start : rows.stop] = alpha.reshape(len(rows), side, width, side).mean((1, 3))
-    depth, normal = result[0].astype(np.float32), np.moveaxis(result[1:4], 0, 2).astype(np.float32)
+    depth, normal = (result[0] / by).astype(np.float32), np.moveaxis(result[1:4], 0, 2).astype(np.float32)
     return Outputs(depth, normal, result[4].astype(np.int32), result[5].astype(np.float32))
 
 
@@ -185,7 +187,8 @@ def paths_light(field: ExactField, stage: Stage, d: Array, random: np.random.Gen
         flying, solid = flying[going], (view.last == OPAQUE)[going] & ~flying[going]
         p = o[:, going] + np.minimum(t, view.end)[going] * d
         place, glow = _met(field, stage, p, d, flying, solid)
-        clear = np.where(flying | solid, 1.0, np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE))
+        fade = stage.ground.fade if stage.ground else 1.0
+        clear = np.where(flying | solid, 1.0, np.exp(-(p[0] ** 2 + p[2] ** 2) / fade**2))
         far = (power if turn else 1.0) * np.reshape(seen.horizon, (3, 1))
         out[:3, ray] += weight * ((1.0 - clear) * far + glow)
         weight = weight * clear

@@ -19,7 +19,7 @@ import numpy.typing as npt
 from scenelang.assets.records import Record
 from scenelang.compiler.geometries import GEOMETRIES
 from scenelang.compiler.graph import Fold, Leaf, Node
-from scenelang.compiler.spaces import AMBIENT, EXTINCTION, FADE, LIFT, NEAREST, Light, Sky, Stage
+from scenelang.compiler.spaces import AMBIENT, EXTINCTION, LIFT, NEAREST, Light, Sky, Stage
 from scenelang.compiler.steps import Affine, Displace, Own, Shell, Skin, Step, Twist, Warp
 from scenelang.drawing.exact.field import (
     Array,
@@ -34,6 +34,7 @@ from scenelang.drawing.exact.field import (
     worn,
 )
 from scenelang.drawing.image import Image, from_light
+from scenelang.drawing.size import sized_root
 from scenelang.language.words import TOKENS
 
 Ints = npt.NDArray[np.int64]
@@ -456,6 +457,7 @@ def solid_image(
     """
     if fault := stage.fault():
         raise ValueError(fault)
+    root, stage, _ = sized_root(root, stage)
     field = ExactField(root, brought)
     width, height = canvas
     step = max(1, TILE // (width * per_side * per_side))
@@ -486,7 +488,7 @@ def radiance(field: ExactField, stage: Stage, d: Array) -> Array:
         p = o[:, seen] + view.end[seen] * d[:, seen]
         upright = np.broadcast_to([[0.0], [1.0], [0.0]], p.shape)
         shade = np.reshape(stage.ground.rgb, (3, 1)) * _received(field, stage, p, upright)
-        clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / FADE)
+        clear = np.exp(-(p[0] ** 2 + p[2] ** 2) / stage.ground.fade**2)
         behind[:3, seen] = clear * shade + (1.0 - clear) * np.reshape(stage.horizon, (3, 1))
         behind[3, seen] = 1.0
     seen = np.nonzero(view.last == OPAQUE)[0]

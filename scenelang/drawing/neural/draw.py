@@ -24,6 +24,7 @@ from scenelang.drawing.neural.coverage import Coverage, Tile
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.meetings import LEVELS
 from scenelang.drawing.neural.network import FramedNetwork
+from scenelang.drawing.size import growth, sized
 from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
@@ -121,7 +122,7 @@ def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
     """Draw a Program, as of `Run`, in the time that there is; raises `RenderError` where it is too short."""
-    plan, patient = Plan(program.canvas), run.pop("patient", False)
+    program, plan, patient = sized(program), Plan(program.canvas), run.pop("patient", False)
     if not patient:
         plan = plan_of(program, network, run.get("samples", "adaptive"))
     with _timed(network, program, patient):
@@ -239,8 +240,11 @@ def program_outputs(
 
 def _outputs(network: FramedNetwork | SolidNetwork, program: Program, threads: int) -> Outputs:
     if program.stage is not None:
+        by, program = growth(program.stage), sized(program)
         solids = solid_field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
+        assert result.depth is not None
+        result = replace(result, depth=result.depth / np.float32(by))
     else:
         image = draw(network, replace(program, background=None)).image  # type: ignore[arg-type]
         field = Field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]

@@ -19,7 +19,7 @@ from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenelang.compiler.spaces import FADE, LIFT, Ground, Sky, Stage
+from scenelang.compiler.spaces import LIFT, Ground, Sky, Stage
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
 from scenelang.drawing.solid.centres import UNKNOWN
 from scenelang.drawing.solid.emitters import Emitters
@@ -359,7 +359,7 @@ class Around:
         index, shares = ground_places(xp, at[0], at[2], isqrt(self.count - self.first))
         index = index + self.first
         shares = shares * (xp.take(self.nodes.weight, index.reshape(-1)).reshape(index.shape) + 1e-4)
-        kept = xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / FADE))
+        kept = xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / self.stage.ground.fade**2))
         return index, shares / shares.sum(0), kept, xp.take(self.nodes.n, index[0])
 
     def _solved(self, direct: Array) -> Array:

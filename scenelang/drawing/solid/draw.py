@@ -14,7 +14,7 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from scenelang.compiler.program import ProgramError
-from scenelang.compiler.spaces import AMBIENT, FADE, LIFT, NEAREST, Camera, Light, Stage
+from scenelang.compiler.spaces import AMBIENT, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
 from scenelang.drawing.kernel import Asked
@@ -460,7 +460,7 @@ class Lighting:
         p = origin + way * t
         n = p * 0
         n[1] = 1.0
-        kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / FADE))
+        kept = xp.exp((p[0] * p[0] + p[2] * p[2]) * (-1 / ground.fade**2))
         rgb = np.tile(np.asarray(ground.rgb, np.float32), len(self.horizon) // 3)
         colour = xp.array(rgb, p)[:, None]
         if self.around is not None:

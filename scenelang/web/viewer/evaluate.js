@@ -199,7 +199,7 @@ const INKS = {
   density: ([density]) => ["density", densityFrom(bare(density))],
 };
 const PROPERTIES = ["opacity", "glow", "density"];
-const MOST_DENSE = 100;
+const MOST_DENSE = 1e6;
 
 function powerFrom(power) {
   return power >= 0 && power <= 1e12 ? power : refuse(`a power of ${power}`);

@@ -148,7 +148,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
     }
     vec3 p = EYE + t * way;
     if (!surface) {
-      float kept = exp(-dot(p.xz, p.xz) / FADE);
+      float kept = exp(-dot(p.xz, p.xz) / (stage.ground.fade * stage.ground.fade));
       colour = other = kept * stage.ground.rgb;
       haze = (1.0 - kept) * stage.horizon;
     }

@@ -4,7 +4,7 @@ import { checkedProgram, floats, linking, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
-import { axesOf } from "./stage.js";
+import { axesOf, FADE } from "./stage.js";
 import { aroundOf } from "./around.js";
 
 const ROW_TEXELS = 15; // as the shader has it
@@ -234,8 +234,8 @@ export function solidDrawer(gl, view) {
       canvas: [ready.width, ready.height, ready.pixel],
     };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
-    const { light: _, ...stage } = ready.program.stage;
-    setUniforms(gl, at, "stage", { ...stage, lights: lampsOf(ready.program.stage, lamps) });
+    const { light: _, ground, ...stage } = ready.program.stage;
+    setUniforms(gl, at, "stage", { ...stage, ground: ground && { fade: FADE, ...ground }, lights: lampsOf(ready.program.stage, lamps) });
     gl.uniform4iv(at("grid"), ready.cells);
     gl.uniform4fv(at("cells"), network.cells);
     for (const [name, value] of Object.entries(around.uniforms)) gl[`uniform${value.length}fv`](at(name), value);

@@ -5,10 +5,11 @@ import { linearColour } from "./looks.js";
 
 const MOST_OF_STAGE = 1e12; // narrower views are none
 const MOST_LAMPS = 8;
+export const FADE = 8; // of a ground that does not say it
 
 /** Readers of arguments, by their kinds. */
 const KINDS_OF_STAGE = {
-  number: bare, power: bare, extent: bare, angle: radians, point: (value) => numbersOf(value, 3),
+  number: bare, power: bare, extent: bare, distance: bare, angle: radians, point: (value) => numbersOf(value, 3),
   opaque: (value) => linearColour(sharesOf(value)),
 };
 
@@ -29,6 +30,10 @@ export function stageFrom({ background, ...given }, lamps, { dimension, stage: k
   if (stage.sky && !paint) Object.assign(stage, { horizon: stage.sky.horizon, zenith: stage.sky.zenith });
   stage.lights = lamps.length ? lightsFrom(lamps, known) : [stage.light];
   stage.lights = stage.lights.map(({ radius, ...lamp }) => (radius ? { ...lamp, radius } : lamp));
+  if (stage.ground?.fade === FADE) {
+    const { fade: _, ...ground } = stage.ground;
+    stage.ground = ground;
+  }
   [stage.light] = stage.lights;
   if (stage.sky || stage.lights.length !== 1 || stage.light.radius) delete stage.light;
   else for (const word of ["sky", "lights"]) delete stage[word]; // as stages were before there was more
@@ -50,7 +55,7 @@ function lightsFrom(lamps, known) {
 
 function partFrom(word, [...values], { usual, fields }) {
   if (word === "ground" && values[0] === null) {
-    return values[1] === undefined ? null : refuse("`ground(none)` has no colour");
+    return values.slice(1).every((value) => value === undefined) ? null : refuse("`ground(none)` has other values");
   }
   const part = { ...usual[word] };
   fields[word].forEach(([name, kind, low, high], at) => {
