@@ -14,7 +14,13 @@
                      int32_t, int32_t, float *, float *, int32_t *, float *, int64_t *, Piece *, int64_t, void *); \
     void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
                    float *, int64_t *, void *); \
-    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *);
+    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *); \
+    void around_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, int32_t, int32_t, float *, \
+                    float *, void *); \
+    void arriving_##v(const Scene *, const Around *, int64_t, const float *, const float *, int32_t, float *, float *, void *); \
+    int64_t glowing_##v(const Scene *, const Around *, int64_t, const float *, const float *, float, float *, float *, int32_t *, \
+                        float *, int64_t, void *); \
+    void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -42,9 +48,9 @@ OUT int32_t newest(void) { return 0; }
 OUT const char *mark(void) { return MARK; }  // a digest of the sources
 // What tables.py has to agree with.
 OUT void sizes(int32_t r[9]) {
-    size_t all[9] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
-                     sizeof(Lamp), sizeof(Stage)};
-    for (int i = 0; i < 9; i++) r[i] = (int32_t)all[i];
+    size_t all[11] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
+                     sizeof(Lamp), sizeof(Stage), sizeof(Node), sizeof(Around)};
+    for (int i = 0; i < 11; i++) r[i] = (int32_t)all[i];
 }
 OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); }
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
@@ -67,4 +73,20 @@ OUT void cones(int32_t variant, const Scene *s, int64_t n, const float *at, floa
 OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light,
                float *alpha, int64_t *counts, void *memory) {
     PICK(shade, s, stage, n, across, way, light, alpha, counts, memory);
+}
+OUT void around(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn,
+                int32_t rays, int32_t finer, float *light, float *matrix, void *memory) {
+    PICK(around, s, a, n, p, normal, turn, rays, finer, light, matrix, memory);
+}
+OUT void arriving(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer,
+                  float *light, float *reach, void *memory) {
+    PICK(arriving, s, a, n, p, way, finer, light, reach, memory);
+}
+OUT int64_t glowing(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth,
+                    float *light, float *free, int32_t *point, float *ray, int64_t room, void *memory) {
+    return PICK(glowing, s, a, n, p, normal, worth, light, free, point, ray, room, memory);
+}
+OUT void haze(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach,
+              float *light, float *clear, void *memory) {
+    PICK(haze, s, a, n, p, way, reach, light, clear, memory);
 }

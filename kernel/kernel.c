@@ -1,6 +1,7 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
 #include "cone.h"
 #include "shade.h"
+#include "light.h"
 #define BLOCK (256 / W)  // packets that have a list of objects in common
 #ifndef NAME
 #define NAME(x) x
@@ -10,14 +11,8 @@ typedef struct { V at; M in; const Object *object; int far; } Near;  // an objec
 
 static void *aligned(void *p) { return (void *)(((uintptr_t)p + 63) & ~(uintptr_t)63); }
 // Bytes of scratch that calls need.
-int64_t NAME(scratch)(const Scene *s) { return 128 + (int64_t)(sizeof(Slot) + sizeof(int32_t)) * (s->objects + 1); }
+int64_t NAME(scratch)(const Scene *s) { return 192 + (int64_t)(sizeof(Slot) + sizeof(int32_t)) * (s->objects + 1) + 2 * (int64_t)sizeof(Level); }
 
-IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
-    for (int k = 0; k < W; k++) {
-        int64_t j = at + k < n ? at + k : n - 1;
-        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
-    }
-}
 // Objects, as numbers that rise, that points of packets from `from` on may meet within their reach.
 static int listed(const Scene *s, const float *p, const float *reach, int64_t n, int64_t from, int32_t *list) {
     V low = {all(BIG), all(BIG), all(BIG)}, high = {all(-BIG), all(-BIG), all(-BIG)};
@@ -69,10 +64,6 @@ IN int held(const Scene *s, V q, F reach, float far, M some, const int32_t *list
         if (any(in)) near[n++] = (Near){a, in, o, o->radius + far / o->scale > RIM};
     }
     return n;
-}
-IN void store(float *to, int64_t n, int64_t at, F values) {
-    if (at + W <= n) memcpy(to + at, &values, sizeof values);
-    else memcpy(to + at, &values, 4 * (size_t)(n - at));
 }
 IN int64_t asked(const Scene *s, int64_t n, const float *p, const float *reach, float *distance, float *gradient,
                  float *look, int32_t *owner, void *scratch, const int wanted) {
@@ -253,4 +244,61 @@ void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, 
         }
     }
     counts[0] = w.lights; counts[1] = w.near; counts[2] = w.steps; counts[3] = w.met; counts[4] = w.lost;
+}
+static Gather gathering(const Scene *s, const Around *a, void *scratch) {
+    Gather w = {s, a, aligned(scratch), 0, 0, 0};
+    w.list = (int32_t *)(w.slot + s->objects + 1);
+    w.level = aligned(w.list + s->objects + 1);
+    for (int i = 0; i < s->objects; i++) w.list[i] = i;
+    return w;
+}
+// Light (6, n) from everywhere, as of `gathered`, that n points with unit normals (3, n) receive by so many rays.
+void NAME(around)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn, int32_t rays,
+                  int32_t finer, float *light, float *matrix, void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, matrix);
+}
+// Light (3, n) that comes to n points (3, n) from unit directions, without media, and from how far (n).
+void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer, float *light,
+                    float *reach, void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    for (int64_t from = 0; from < n; from += BEAM) {
+        int some = (int)(n - from < BEAM ? n - from : BEAM);
+        for (int d = 0; d < 3; d++) for (int i = 0; i < some; i++) {
+            w.level->ray.from.v[d][i] = p[d * n + from + i];
+            w.level->ray.way.v[d][i] = way[d * n + from + i];
+        }
+        brought(&w, w.level, some, finer);
+        for (int d = 0; d < 3; d++) memcpy(light + d * n + from, w.level->light.v[d], 4 * (size_t)some);
+        memcpy(reach + from, w.level->reach, 4 * (size_t)some);
+    }
+}
+// Light of what glows at n points, as of `glowing`; the number of rays that there was room for.
+int64_t NAME(glowing)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth, float *light,
+                      float *free, int32_t *point, float *ray, int64_t room, void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    int64_t count = 0;
+    glowing(&w, n, p, normal, worth, light, free, point, ray, room, &count);
+    return count;
+}
+// Light (3, n) of media along n rays from points (3, n) from as far as a reach (n), and what these let through (n).
+void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach, float *light,
+                float *clear, void *scratch) {
+    Level *l = gathering(s, a, scratch).level;
+    for (int64_t from = 0; from < n; from += BEAM) {
+        int some = (int)(n - from < BEAM ? n - from : BEAM);
+        for (int d = 0; d < 3; d++) for (int i = 0; i < BEAM; i++) {
+            int64_t j = from + (i < some ? i : some - 1);
+            l->ray.from.v[d][i] = p[d * n + j]; l->ray.way.v[d][i] = way[d * n + j]; l->reach[i] = reach[j];
+        }
+        haze_of(a, l, some);
+        for (int d = 0; d < 3; d++) memcpy(light + d * n + from, l->haze.v[d], 4 * (size_t)some);
+        memcpy(clear + from, l->clear, 4 * (size_t)some);
+    }
 }

@@ -86,3 +86,13 @@ IN F exponential(F x) {  // of x <= 0, within 2e-7 of itself
     F p = 1.0f + f * (0.693147182f + f * (0.240226462f + f * (0.0555032f + f * (0.00961672f + f * 0.00133908f))));
     return p * (F)((cut(k) + 127) << 23);
 }
+IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
+    for (int k = 0; k < W; k++) {
+        int64_t j = at + k < n ? at + k : n - 1;
+        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
+    }
+}
+IN void store(float *to, int64_t n, int64_t at, F values) {
+    if (at + W <= n) memcpy(to + at, &values, sizeof values);
+    else memcpy(to + at, &values, 4 * (size_t)(n - at));
+}

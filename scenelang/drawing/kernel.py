@@ -21,9 +21,11 @@ import numpy.typing as npt
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.how import RenderError, check_time
 from scenelang.drawing.tables import (
+    AROUND,
     CELL,
     DECODER,
     LAMP,
+    NODE,
     OBJECT,
     PIECE,
     SCENE,
@@ -36,12 +38,14 @@ from scenelang.drawing.tables import (
 
 FOLDER: Final = Path(__file__).resolve().parent
 ROOT: Final = FOLDER.parents[1]  # of a checkout
-_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE)
+_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE, NODE, AROUND)
 _SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
     **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
+    **{"around": ("ipplpppiippp", ""), "arriving": ("ipplppippp", ""), "glowing": ("ipplppfpppplp", "l")},
+    **{"haze": ("ipplpppppp", "")},
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -271,10 +275,121 @@ class Kernel:
             counts[1] += counts[0]
         return result, tuple(counts[1].tolist())
 
+    def around(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        n: Floats,
+        turns: Floats,
+        rays: int,
+        *,
+        finer: bool = False,
+        matrix: Floats | None = None,
+        until_s: float = NEVER,
+    ) -> Floats:
+        """Light that points (3, M) with unit normals (3, M) receive by so many rays, by the tables of an `AROUND`
+        row, and how far halves of these are from it (6, M). Turns (2, M) tell points apart. If ``finer``,
+        some rays send others where they end.
 
-def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:
-    """Parts of so many rays, at least one; raises `RenderError` as `check_time` does before each."""
+        With a ``matrix`` (M, nodes) of zeros the shares of nodes that are seen are added to it, and the
+        result is what comes from elsewhere, then the part of rays that meet objects.
+        """
+        scene, result = tables.scene.ctypes.data, np.empty((6, p.shape[1]), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        for some in _portions(tables, p.shape[1], until_s, rays):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, n, turns)]
+            light = np.empty((6, given[0].shape[1]), np.float32)
+            into = None if matrix is None else matrix[some].ctypes.data
+            start = scene, around.ctypes.data, light.shape[1], *(part.ctypes.data for part in given)
+            rest = rays, finer, light.ctypes.data, into, scratch.ctypes.data
+            self._library.around(self.variant, *start, *rest)
+            result[:, some] = light
+        return result
+
+    def arriving(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        way: Floats,
+        finer: bool = False,
+        until_s: float = NEVER,
+    ) -> tuple[Floats, Floats]:
+        """Light (3, M) that comes to points (3, M) from unit directions (3, M), without media, and from how far;
+        the rest as of `around`.
+        """
+        scene, count = tables.scene.ctypes.data, p.shape[1]
+        light, reach = np.empty((3, count), np.float32), np.empty(count, np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        for some in _portions(tables, count, until_s):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, way)]
+            part, far = np.empty_like(given[0]), reach[some]
+            start = scene, around.ctypes.data, len(far), *(part.ctypes.data for part in given)
+            rest = finer, part.ctypes.data, far.ctypes.data, scratch.ctypes.data
+            self._library.arriving(self.variant, *start, *rest)
+            light[:, some] = part
+        return light, reach
+
+    def haze(
+        self, tables: Tables, around: Rows, p: Floats, way: Floats, reach: Floats
+    ) -> tuple[Floats, Floats]:
+        """Light (3, M) of media along rays from points (3, M) in unit directions (3, M) from as far as a reach
+        (M,), by the tables of an `AROUND` row, and the part (M,) that they let through.
+        """
+        given = [np.ascontiguousarray(part, np.float32) for part in (p, way, reach)]
+        scene, clear = tables.scene.ctypes.data, np.empty_like(given[2])
+        light = np.empty((3, len(clear)), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        places = [part.ctypes.data for part in (*given, light, clear, scratch)]
+        self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
+        return light, clear
+
+    def glowing(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        n: Floats | None,
+        worth: float,
+        *,
+        parts: bool = True,
+        drawn: int = 0,
+        until_s: float = NEVER,
+    ) -> tuple[Floats, Floats, npt.NDArray[np.int32], Floats]:
+        """Light (3, M) of discs at points (3, M) with unit normals (3, M), or surfaces that face each disc, if
+        nothing hides it, and the parts (3, M) that arrive, if asked, by fewer rays where less is received
+        than ``worth``. Of so many of these rays from each point numbers (k,) of points, and unit ways and
+        light that arrives (6, k).
+        """
+        scene, count = tables.scene.ctypes.data, p.shape[1]
+        light, free = np.empty((3, count), np.float32), np.ones((3, count), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        numbers, rays = [np.empty(0, np.int32)], [np.empty((6, 0), np.float32)]
+        for some in _portions(tables, count, until_s, 32):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, n) if part is not None]
+            size = given[0].shape[1]
+            sent, clear = np.empty((3, size), np.float32), np.empty((3, size), np.float32)
+            point, ray = np.empty(drawn * size, np.int32), np.empty((6, drawn * size), np.float32)
+            start = scene, around.ctypes.data, size, given[0].ctypes.data
+            facing = given[1].ctypes.data if n is not None else None
+            into = sent.ctypes.data, clear.ctypes.data if parts else None
+            rest = point.ctypes.data, ray.ctypes.data, drawn * size, scratch.ctypes.data
+            found = self._library.glowing(self.variant, *start, facing, worth, *into, *rest)
+            light[:, some] = sent
+            if parts:
+                free[:, some] = clear
+            numbers.append(point[:found] + np.int32(some.start))
+            rays.append(ray[:, :found])
+        return light, free, np.concatenate(numbers), np.concatenate(rays, 1)
+
+
+def _portions(tables: Tables, count: int, until_s: float, each: int = 1) -> Iterator[slice]:
+    """Parts of so many points with rays of ``each``, at least one; raises `RenderError` as `check_time` does
+    before each.
+    """
     size = max(PORTION * MANY // max(int(tables.scene["objects"]), MANY), PORTION >> 6)
+    size = max(size // each, 16)
     for begin in range(0, max(count, 1), size):
         check_time(until_s)
         yield slice(begin, min(begin + size, count))

@@ -158,8 +158,7 @@ def _glowing(around: Around, p: Floats, counts: Counts) -> Floats:
     result = np.zeros((len(counts(p)), 3, p.shape[1]), np.float32)
     for start in range(0, p.shape[1] if around.emitters.there else 0, BATCH):
         band = slice(start, start + BATCH)
-        _, point, way, light, clear = around.emitters.seen(p[:, band], None, 0.0)
-        light = light * clear
+        point, way, light = around.drawn(p[:, band])
         for row, count in zip(result, counts(way), strict=True):
             around.xp.add(row[:, band], point, light * count / 4)
     return result.reshape(-1, p.shape[1])

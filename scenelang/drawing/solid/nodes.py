@@ -9,13 +9,12 @@ Letters: J nodes, the first ones on objects, N objects.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from scenelang.compiler.spaces import Stage
-from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.arrays import Array
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.tables import inverses
 
@@ -52,19 +51,6 @@ class Nodes(NamedTuple):
 def spread(index: np.ndarray, count: int = 4) -> np.ndarray:
     """Points (count, K) of the unit cube that lie evenly (a Kronecker sequence)."""
     return np.asarray((0.5 + np.outer(ROOTS[:count], index)) % 1.0)
-
-
-def turned(xp: Arrays, n: Array, local: Array, wanted: Sequence[int] = (0, 1, 2)) -> Array:
-    """Directions (3, …, K) whose third axis is that of unit normals (3, K), or some of their coordinates
-    (Duff et al. 2017).
-    """
-    sign = xp.select(n[1] < 0, 0 * n[1] - 1, 0 * n[1] + 1)
-    a = -1 / (sign + n[1])
-    b = n[0] * n[2] * a
-    first = (1 + sign * n[0] * n[0] * a, -sign * n[0], sign * b)
-    second = (b, -n[2], sign + n[2] * n[2] * a)
-    x, y, z = local
-    return xp.stack([first[i] * x + second[i] * y + n[i] * z for i in wanted], 0)
 
 
 def sphere(u: np.ndarray, v: np.ndarray) -> np.ndarray:
@@ -203,20 +189,3 @@ def on_ground(field: SolidField, stage: Stage, many: bool) -> Nodes:
     d = field.near(p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
     place = xp.concat([p, xp.full((5, p.shape[1]), 1.0, p)], 0)
     return Nodes(p, n, colour, 0 * p, (d / COVERED).clip(0.0, 1.0), 0 * p[0], place)
-
-
-def ground_places(xp: Arrays, x: Array, z: Array, side: int) -> tuple[Array, Array]:
-    """The four of side² nodes of the ground (4, K) around places (K,), from 0, and their shares (4, K)."""
-    rows, parts = [], []
-    for place in (x, z):
-        scaled = place * (float(np.sinh(WARP)) / FAR)
-        size = abs(scaled)
-        u = xp.log(size + xp.sqrt(size * size + 1)) * xp.select(scaled < 0, 0 * x - 1, 0 * x + 1) / WARP
-        at = ((u + 1) * ((side - 1) / 2)).clip(0.0, side - 1.001)
-        low = xp.floor(at)
-        rows.append(xp.whole(low))
-        parts.append(at - low)
-    (i, j), (a, b) = rows, parts
-    first = j * side + i
-    index = xp.stack([first, first + 1, first + side, first + side + 1], 0)
-    return index, xp.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], 0)
