@@ -20,7 +20,10 @@
     void arriving_##v(const Scene *, const Around *, int64_t, const float *, const float *, int32_t, float *, float *, void *); \
     int64_t glowing_##v(const Scene *, const Around *, int64_t, const float *, const float *, float, float *, float *, int32_t *, \
                         float *, int64_t, void *); \
-    void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *);
+    void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *); \
+    int64_t crossings_##v(const Scene *, int64_t, const int32_t *, const float *, const float *, const float *, const float *, int64_t, \
+                          int32_t *, float *); \
+    void mirrored_##v(int64_t, const float *, float, const float *, const float *, const float *, const float *, const float *, float *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -89,4 +92,12 @@ OUT int64_t glowing(int32_t variant, const Scene *s, const Around *a, int64_t n,
 OUT void haze(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach,
               float *light, float *clear, void *memory) {
     PICK(haze, s, a, n, p, way, reach, light, clear, memory);
+}
+OUT int64_t crossings(int32_t variant, const Scene *s, int64_t n, const int32_t *object, const float *p, const float *way,
+                      const float *rate, const float *least, int64_t room, int32_t *line, float *along) {
+    return PICK(crossings, s, n, object, p, way, rate, least, room, line, along);
+}
+OUT void mirrored(int32_t variant, int64_t n, const float *at, float radius, const float *p, const float *normal, const float *rough,
+                  const float *back, const float *straight, float *light) {
+    PICK(mirrored, n, at, radius, p, normal, rough, back, straight, light);
 }

@@ -302,3 +302,50 @@ void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, cons
         memcpy(clear + from, l->clear, 4 * (size_t)some);
     }
 }
+// Where n lines from points (3, n) all the way (3, n) meet the surfaces of objects alone, by their numbers: lines and how far
+// along, from 0 to 1, as many as there is room for; their number. Steps are as long as the distance, which changes at rates
+// (n) at most, and at least so small a part (n) of a line.
+int64_t NAME(crossings)(const Scene *s, int64_t n, const int32_t *object, const float *p, const float *way, const float *rate,
+                        const float *least, int64_t room, int32_t *line, float *along) {
+    int64_t count = 0;
+    for (int64_t i = 0, end; i < n; i = end) {
+        const Object *o = s->object + object[i];
+        for (end = i; end < n && end < i + W && object[end] == object[i];) end++;
+        V from, to, local;
+        F slowest, part, t = all(0);
+        M alive;
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < end ? i + k : end - 1;
+            from.x[k] = p[j]; from.y[k] = p[n + j]; from.z[k] = p[2 * n + j];
+            to.x[k] = way[j]; to.y[k] = way[n + j]; to.z[k] = way[2 * n + j];
+            slowest[k] = 1 / rate[j]; part[k] = fmaxf(least[j], 1e-4f); alive[k] = i + k < end ? -1 : 0;
+        }
+        from = mapped(o->map, from); to = times(o->map, to);
+        F d = leaf_distance(s, o, from, 1, &local);
+        while (any(alive)) {
+            F step = max2(size_of(d) * slowest, part), past = leaf_distance(s, o, plus(from, scaled(to, t + step)), 1, &local);
+            for (int m = bits(alive & ((past < 0.0f) ^ (d < 0.0f))); m; m &= m - 1) {
+                int k = __builtin_ctz((unsigned)m);
+                if (count < room) { line[count] = (int32_t)(i + k); along[count] = t[k] + step[k] * d[k] / (d[k] - past[k]); }
+                count++;
+            }
+            t += step; d = past;
+            alive &= t < 1.0f;
+        }
+    }
+    return count;
+}
+// Light (3, n) of a lamp of power 1 and a radius that rough mirrors at n points with unit normals send back if nothing is in
+// its way; of roughness (n), unit ways back (3, n) and what they reflect along the normal (3, n).
+void NAME(mirrored)(int64_t n, const float *at, float radius, const float *p, const float *normal, const float *rough,
+                    const float *back, const float *straight, float *light) {
+    V lamp = {all(at[0]), all(at[1]), all(at[2])};
+    for (int64_t i = 0; i < n; i += W) {
+        V q, up, to, part;
+        F uneven;
+        read_points(p, n, i, &q); read_points(normal, n, i, &up); read_points(back, n, i, &to); read_points(straight, n, i, &part);
+        for (int k = 0; k < W; k++) uneven[k] = rough[i + k < n ? i + k : n - 1];
+        V r = mirrored(lamp, radius, q, up, uneven, to, part);
+        store(light, n, i, r.x); store(light + n, n, i, r.y); store(light + 2 * n, n, i, r.z);
+    }
+}

@@ -449,3 +449,50 @@ static void glowing(Gather *w, int64_t n, const float *p, const float *normal, f
         }
     }
 }
+IN V unit(V a) { return over(a, max2(length_of(a), all(1e-9f))); }
+IN F masked(F cosine, F square) {
+    F r = 2.0f * cosine / max2(cosine + root(square + (1.0f - square) * cosine * cosine), all(1e-9f));
+    return sel(cosine > 0.0f, r, all(0));
+}
+// What a rough mirror sends back of light along a unit way, times the cosine (scenelang/drawing/solid/gloss.py).
+IN V lobe(V n, F square, V back, V straight, V way) {
+    V half = unit(plus(back, way));
+    F up = dot(half, n), cosine = max2(dot(n, back), all(1e-4f)), even = up * up * (square - 1.0f) + 1.0f;
+    F facets = square / max2(PI * even * even, all(1e-12f));
+    F rest = 1.0f - clamp(dot(half, way), 0, 1), fifth = rest * rest * rest * rest * rest;
+    F part = facets * masked(cosine, square) * masked(dot(n, way), square) / (4.0f * cosine);
+    return (V){part * (straight.x + (1.0f - straight.x) * fifth), part * (straight.y + (1.0f - straight.y) * fifth),
+               part * (straight.z + (1.0f - straight.z) * fifth)};
+}
+enum { TURNS = 8, TURNED = 4 };  // of a lamp's disc about the mirrored way, and places on each
+// Light of a lamp of power 1 that rough mirrors send back if nothing is in its way: of its disc, as evenly as facets lie there.
+static ONCE V mirrored(V at, float radius, V p, V n, F rough, V back, V straight) {
+    V axis = minus(at, p), total = {all(0), all(0), all(0)};
+    F far = max2(length_of(axis), all(1e-3f)), square = rough * rough * rough * rough;
+    axis = over(axis, far);
+    if (!(radius > 0)) return scaled(lobe(n, square, back, straight, axis), PI / (far * far));
+    V r = minus(scaled(n, 2.0f * dot(n, back)), back);
+    F x = dot(r, axis), sine = clamp(radius / far, 0, 1), aside = root(max2(1.0f - x * x, all(1e-12f))), rim = root(1.0f - sine * sine);
+    V u = unit(minus(axis, scaled(r, x))), v = {r.y * u.z - r.z * u.y, r.z * u.x - r.x * u.z, r.x * u.y - r.y * u.x};
+    F inner = clamp(sine / aside, 0, 1), widest = sel(x > rim, all(PI), arc(root(1.0f - inner * inner)));
+    for (int i = 0; i < TURNS; i++) {
+        float place = (2 * i + 1 - TURNS) * (PI / 2 / TURNS);
+        F s, c, turn = widest * sinf(place), end[2];
+        sines(turn, &s, &c);
+        F y = aside * c, size = max2(root(x * x + y * y), all(1e-6f)), cosine = clamp(rim / size, 0, 1);
+        F half = root(1.0f - cosine * cosine);
+        for (int k = 0; k < 2; k++) {  // tangents of half the angles from r, and of how many facets lie before
+            float side = k ? 1 : -1;
+            F t = max2((y * cosine + side * x * half) / max2(size + x * cosine - side * y * half, all(1e-4f)), all(0));
+            end[k] = t * t / (t * t + square);
+        }
+        F part = (end[1] - end[0]) * widest * (2 * PI / TURNS / TURNED * cosf(place)) / square;
+        for (int k = 0; k < TURNED; k++) {
+            F share = clamp(end[0] + (end[1] - end[0]) * ((k + 0.5f) / TURNED), 0, 1 - 1e-6f), t = square * share / (1.0f - share);
+            F straightly = (1.0f - t) / (1.0f + t), sideways = 2.0f * root(t) / (1.0f + t), dense = (t + square) / (1.0f + t);
+            V way = plus(scaled(r, straightly), scaled(plus(scaled(u, c), scaled(v, s)), sideways));
+            total = plus(total, scaled(lobe(n, square, back, straight, way), part * dense * dense));
+        }
+    }
+    return scaled(total, sel(far > radius, all(1 / (radius * radius)), all(0)));
+}

@@ -45,7 +45,8 @@ _CALLS: Final = {
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
     **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
     **{"around": ("ipplpppiippp", ""), "arriving": ("ipplppippp", ""), "glowing": ("ipplppfpppplp", "l")},
-    **{"haze": ("ipplpppppp", "")},
+    **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"mirrored": ("ilpfpppppp", "")},
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -159,6 +160,26 @@ class Kernel:
         given = numbers.ctypes.data, points.ctypes.data, None, None, result.ctypes.data
         self._library.own(self.variant, tables.scene.ctypes.data, count, *given)
         return result
+
+    def crossings(
+        self, tables: Tables, objects: npt.NDArray[np.integer], begin: Floats, way: Floats, *parts: Floats
+    ) -> tuple[npt.NDArray[np.int32], Floats]:
+        """Lines (k,), of those that begin at (3, M) and go all the way (3, M), that meet the surfaces of objects
+        alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long as the
+        distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
+        """
+        numbers = np.ascontiguousarray(objects, np.int32)
+        given = [np.ascontiguousarray(part, np.float32) for part in (begin, way, *parts)]
+        count, room = len(numbers), 4 * len(numbers)
+        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
+        while True:
+            line, along = np.empty(room, np.int32), np.empty(room, np.float32)
+            places = [part.ctypes.data for part in (numbers, *given)]
+            rest = room, line.ctypes.data, along.ctypes.data
+            found = self._library.crossings(self.variant, tables.scene.ctypes.data, count, *places, *rest)
+            if found <= room:
+                return line[:found], along[:found]
+            room = found
 
     def rays(
         self,
@@ -344,6 +365,19 @@ class Kernel:
         places = [part.ctypes.data for part in (*given, light, clear, scratch)]
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
+
+    def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
+        """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M) with
+        unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness, unit ways
+        back, and what they reflect along the normal, in threes.
+        """
+        at, p, n, coat = (np.ascontiguousarray(part, np.float32) for part in (at, p, n, coat))
+        result = np.empty_like(coat[4:])
+        for row in range(0, len(result), 3):
+            parts = (p, n, coat, coat[1:4], coat[4 + row :], result[row:])
+            places = [part.ctypes.data for part in parts]
+            self._library.mirrored(self.variant, p.shape[1], at.ctypes.data, radius, *places)
+        return result
 
     def glowing(
         self,

@@ -8,6 +8,8 @@ Letters: J nodes, K points, D discs.
 
 from __future__ import annotations
 
+from math import ceil, log2
+
 import numpy as np
 
 from scenelang.drawing.solid.field import SolidField
@@ -24,28 +26,26 @@ class Emitters:
         self.field, self.xp = field, field.xp
         parts = (nodes.p, nodes.n, nodes.glow, nodes.area, nodes.place)
         p, n, glow, area, place = (np.asarray(self.xp.to_numpy(part), np.float64) for part in parts)
-        bright = glow.max(0) > 0
-        groups = [np.flatnonzero(bright & (place[3] == i)) for i in np.unique(place[3, bright])]
-        self.there = len(groups) > 0
+        bright = np.flatnonzero(glow.max(0) > 0)
         # halved as it is in the objects' spaces, which they take along where they move
-        apart = np.concatenate([place[:3], TURNED * place[5:]]).round(3)
-        while self.there and len(groups) < DISCS:
-            halves = []
-            for group in groups:
-                if not len(group):
-                    halves += [group, group]
-                    continue
-                axis = np.ptp(apart[:, group], 1).argmax()
-                along = apart[axis, group]
-                beyond = along > (along.min() + along.max()) / 2
-                halves += [group[~beyond], group[beyond]]
-            groups = halves
-        discs = [np.zeros(10)] * (not groups)
-        for group in groups:
-            own, faces = area[group], (n[:, group] * area[group]).sum(1)
-            size = float(np.linalg.norm(faces))
-            centre, light = ((part[:, group] * own).sum(1) / max(own.sum(), 1e-12) for part in (p, glow))
-            discs.append(np.concatenate([centre, faces / max(size, 1e-12), light, [own.sum()]]))
+        apart = np.concatenate([place[:3], TURNED * place[5:]]).round(3)[:, bright]
+        group = np.unique(place[3, bright], return_inverse=True)[1]
+        self.there = len(bright) > 0
+        for _ in range(ceil(log2(DISCS / (group.max() + 1))) if self.there else 0):
+            order = np.argsort(group, kind="stable")
+            first = np.flatnonzero(np.diff(group[order], prepend=-1))
+            least, most = (each.reduceat(apart[:, order], first, 1) for each in (np.minimum, np.maximum))
+            axis, every = (most - least).argmax(0)[group], np.arange(len(group))
+            beyond = apart[axis, every] > (least + most)[axis, group] / 2
+            group = np.unique(2 * group + beyond, return_inverse=True)[1]
+        count = int(group.max(initial=-1)) + 1
+
+        def total(values: np.ndarray) -> np.ndarray:
+            return np.stack([1.0 * np.bincount(group, row[bright] * area[bright], count) for row in values])
+
+        whole, faces = total(0 * area[None] + 1), total(n)
+        faces /= np.linalg.norm(faces, axis=0).clip(1e-12)
+        rows = np.concatenate([total(p) / whole.clip(1e-12), faces, total(glow) / whole.clip(1e-12), whole])
         # (D, 10) places, normals, light and areas; siblings are neighbours
-        self.discs = np.array(discs, np.float32)
+        self.discs = np.ascontiguousarray(rows.T, np.float32)
         self.p, self.n = self.discs.T[:3], self.discs.T[3:6]

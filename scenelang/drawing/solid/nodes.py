@@ -15,6 +15,7 @@ import numpy as np
 
 from scenelang.compiler.spaces import Stage
 from scenelang.drawing.arrays import Array
+from scenelang.drawing.kernel import load_kernel
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.tables import inverses
 
@@ -82,8 +83,8 @@ def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
     counts = _bounded(np.ceil(shares.clip(LEAST[many], more * MOST)), ALL)
     balls = rows["reach"] * (1.0 + (rows["radius"] - 1.0).clip(None, 0.2)) + rows["moved"]
     tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
-    parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
-    lines = np.concatenate([np.zeros((6, 0)), *parts], 1).astype(np.float32)
+    every = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
+    lines = np.concatenate([np.zeros((6, 0)), *every], 1).astype(np.float32)
     objects = np.repeat(np.arange(len(sizes)), tried)
     linear = rows["map"][:, :9].reshape(-1, 3, 3).astype(np.float64)
     back = inverses(linear)
@@ -91,7 +92,8 @@ def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
     world = (back[objects] @ ends).astype(np.float32).transpose(2, 1, 0)  # begins and ways (3, K)
     rates = rows["rate"][objects] * np.linalg.norm(lines[3:], axis=0)
     begin, way = world
-    line, along = _crossings(field, objects, begin, way, rates, np.where(glows, FINE, COARSE)[objects])
+    parts = 1 / np.where(glows, FINE, COARSE)[objects]
+    line, along = load_kernel().crossings(field.tables, objects, begin, way, rates, parts)
     owner, at = objects[line], lines[:3, line] + lines[3:, line] * along
     # each stands for as much of the surface behind the map
     area = (2 * np.pi * balls**2 / tried.clip(1))[owner].astype(np.float32)
@@ -110,36 +112,6 @@ def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
     part = min(1.0, most / max(float(counts.sum()), 1.0))
     whole: np.ndarray = np.diff(np.floor(np.cumsum(counts) * part), prepend=0.0)
     return whole.astype(int)
-
-
-def _crossings(
-    field: SolidField,
-    objects: np.ndarray,
-    begin: np.ndarray,
-    way: np.ndarray,
-    rates: np.ndarray,
-    parts: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lines (k,) that meet the surfaces of their objects (K,), and how far along (k,), from 0 to 1.
-
-    Lines begin at (3, K) and go all the way (3, K). Steps are as long as the distance, which changes at rates
-    (K,) at most, and at least so small a part of a line.
-    """
-
-    def distance(index: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return np.asarray(field.own(objects[index], begin[:, index] + way[:, index] * t, gradient=False)[0])
-
-    index, t = np.arange(len(objects)), np.zeros(len(objects), np.float32)
-    d, lines, places = distance(index, t), [index[:0]], [t[:0]]
-    while len(index):
-        step = np.maximum(abs(d) / rates[index], 1 / parts[index]).astype(np.float32)
-        past = distance(index, t + step)
-        met = np.flatnonzero((past < 0) != (d < 0))
-        lines.append(index[met])
-        places.append(t[met] + step[met] * d[met] / (d[met] - past[met]))
-        on = np.flatnonzero(t + step < 1)
-        index, t, d = index[on], (t + step)[on], past[on]
-    return np.concatenate(lines), np.concatenate(places).astype(np.float32)
 
 
 def _settled(field: SolidField, stage: Stage, p: Array, across: Array, area: Array, place: Array) -> Nodes:
