@@ -252,13 +252,14 @@ static Gather gathering(const Scene *s, const Around *a, void *scratch) {
     for (int i = 0; i < s->objects; i++) w.list[i] = i;
     return w;
 }
-// Light (6, n) from everywhere, as of `gathered`, that n points with unit normals (3, n) receive by so many rays.
+// Light (6, n) from everywhere, as of `gathered`, that n points with unit normals (3, n) receive by so many rays; or, unless
+// `begin` (n + 1) is null, the parts of nodes that they see, from where the first begins on.
 void NAME(around)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn, int32_t rays,
-                  int32_t finer, float *light, float *matrix, void *scratch) {
+                  int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, void *scratch) {
     Scene own = *s;
     own.coloured = 0;
     Gather w = gathering(&own, a, scratch);
-    gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, matrix);
+    gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, begin ? &(Exchange){begin, index, share, row} : 0);
 }
 // Light (3, n) that comes to n points (3, n) from unit directions, without media, and from how far (n).
 void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer, float *light,
@@ -347,5 +348,13 @@ void NAME(mirrored)(int64_t n, const float *at, float radius, const float *p, co
         for (int k = 0; k < W; k++) uneven[k] = rough[i + k < n ? i + k : n - 1];
         V r = mirrored(lamp, radius, q, up, uneven, to, part);
         store(light, n, i, r.x); store(light + n, n, i, r.y); store(light + 2 * n, n, i, r.z);
+    }
+}
+// What n nodes receive (n, 3) where nodes send (nodes, 3), by the parts of these that they see.
+void NAME(exchanged)(int64_t n, const int64_t *begin, const int32_t *index, const float *share, const float *sent, float *received) {
+    for (int64_t j = 0; j < n; j++) {
+        float sum[3] = {0, 0, 0};
+        for (int64_t k = begin[j]; k < begin[j + 1]; k++) for (int d = 0; d < 3; d++) sum[d] += share[k] * sent[3 * index[k] + d];
+        for (int d = 0; d < 3; d++) received[3 * j + d] = sum[d];
     }
 }

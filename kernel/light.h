@@ -34,6 +34,8 @@ typedef struct {
     int32_t of[BEAM];
     End end[BEAM];
 } Level;
+// Parts of nodes that others see: those of the jth lie from begin[j] on; `row` has a 0 for each node.
+typedef struct { int64_t *begin; int32_t *index; float *share, *row; } Exchange;
 typedef struct { const Scene *scene; const Around *around; Slot *slot; int32_t *list; Level *level; int64_t met; } Gather;
 
 // How far rays (n) get, and how deep the media before that are; unless null, the field's gradients there.
@@ -264,7 +266,7 @@ static void lit_by(Gather *w, Level *l, int n) {
     }
 }
 static void gathered(Gather *w, Level *l, int64_t n, int64_t stride, const float *p, const float *normal, const float *turn,
-                     int rays, int finer, float *light, float *matrix);
+                     int rays, int finer, float *light, const Exchange *to);
 // Light that rays (n) bring from where they end, without media. If `finer`, places nearer than nodes may be, and in
 // hollows those around which nodes differ, send rays again.
 static void brought(Gather *w, Level *l, int n, int finer) {
@@ -317,12 +319,13 @@ IN V turned(V n, F x, F y, F z) {  // by the frame whose third axis is n (Duff e
                sign * b * x + (sign + n.z * n.z * a) * y + n.z * z};
 }
 // Light (3, n) that points with unit normals (3, n) receive by so many rays, which numbers (2, n) turn, and how far halves of
-// these are from it (3, n more); rows lie `stride` apart. Or, with a matrix (n, nodes), the parts of each node that they see
+// these are from it (3, n more); rows lie `stride` apart. Or, where an `Exchange` is, the parts of each node that they see
 // there, what they receive of the sky, the horizon and media, and the part of rays that meet objects, in the fourth row.
 static void gathered(Gather *w, Level *l, int64_t n, int64_t stride, const float *p, const float *normal, const float *turn,
-                     int rays, int finer, float *light, float *matrix) {
+                     int rays, int finer, float *light, const Exchange *to) {
     const Around *a = w->around;
     float each = 1.0f / rays;
+    int64_t used = to ? to->begin[0] : 0;
     for (int d = 0; d < 6; d++) memset(light + d * stride, 0, 4 * (size_t)n);
     for (int64_t from = 0; from < n * rays; from += BEAM) {
         int some = (int)(n * rays - from < BEAM ? n * rays - from : BEAM);
@@ -341,14 +344,14 @@ static void gathered(Gather *w, Level *l, int64_t n, int64_t stride, const float
             keep3(&l->ray.way, i, way);  // out of what begins there, in corners
             keep3(&l->ray.from, i, plus(at, plus(scaled(up, all(OFF)), scaled(way, all(AHEAD)))));
         }
-        if (matrix) ends_of(w, l, some);
+        if (to) ends_of(w, l, some);
         else brought(w, l, some, finer);
         if (a->haze) haze_of(a, l, some);
         for (int i = 0; i < some; i++) {
             int64_t j = (from + i) / rays;
             const End *e = l->end + i;
             float part = (a->haze ? l->clear[i] : 1) * each;
-            if (!matrix) {
+            if (!to) {
                 float fade = part * fminf(l->reach[i] / SHUT, 1), sign = ((from + i) % rays + 1) / 2 % 2 ? -1 : 1;
                 for (int d = 0; d < 3; d++) {
                     float sent = l->light.v[d][i] * fade + (a->haze ? l->haze.v[d][i] * each : 0);
@@ -362,7 +365,16 @@ static void gathered(Gather *w, Level *l, int64_t n, int64_t stride, const float
             for (int d = 0; d < 3; d++)
                 light[d * stride + j] += part * (e->count ? a->horizon[d] * (1 - e->kept) : sky[d]) + (a->haze ? l->haze.v[d][i] * each : 0);
             light[3 * stride + j] += l->ray.hit[i] < BIG ? each : 0;
-            for (int k = 0; k < e->count; k++) matrix[j * a->nodes + e->index[k]] += e->share[k] * e->kept * part;
+            for (int k = 0; k < e->count; k++) {
+                float more = e->share[k] * e->kept * part;
+                int32_t node = e->index[k];
+                if (!(more > 0)) continue;
+                if (to->row[node] == 0) to->index[used++] = node;
+                to->row[node] += more;
+            }
+            if ((from + i) % rays < rays - 1) continue;
+            for (int64_t k = to->begin[j]; k < used; k++) { to->share[k] = to->row[to->index[k]]; to->row[to->index[k]] = 0; }
+            to->begin[j + 1] = used;
         }
     }
 }

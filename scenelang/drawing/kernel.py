@@ -44,7 +44,7 @@ _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
     **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
-    **{"around": ("ipplpppiippp", ""), "arriving": ("ipplppippp", ""), "glowing": ("ipplppfpppplp", "l")},
+    **{"around": ("ipplpppiipppppp", ""), "exchanged": ("ilppppp", ""), "arriving": ("ipplppippp", ""), "glowing": ("ipplppfpppplp", "l")},
     **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
 }
@@ -72,6 +72,14 @@ class Asked(NamedTuple):
     register: Array  # (R, M) as `Looks`
     owner: Array  # (M,) numbers of objects whose material holds, from 1; 0 for none
     met: int  # pairs of points and objects that met
+
+
+class Exchange(NamedTuple):
+    """Parts of nodes that M nodes see."""
+
+    begin: npt.NDArray[np.int64]  # (M + 1,) where those that each sees begin
+    index: npt.NDArray[np.int32]  # (k,) which these are
+    share: Floats  # (k,)
 
 
 class Trails(NamedTuple):
@@ -306,27 +314,38 @@ class Kernel:
         rays: int,
         *,
         finer: bool = False,
-        matrix: Floats | None = None,
+        parts: Exchange | None = None,
         until_s: float = NEVER,
     ) -> Floats:
         """Light that points (3, M) with unit normals (3, M) receive by so many rays, by the tables of an `AROUND`
         row, and how far halves of these are from it (6, M). Turns (2, M) tell points apart. If ``finer``,
         some rays send others where they end.
 
-        With a ``matrix`` (M, nodes) of zeros the shares of nodes that are seen are added to it, and the
-        result is what comes from elsewhere, then the part of rays that meet objects.
+        With ``parts`` those of nodes that are seen are written there, and the result is what comes from
+        elsewhere, then the part of rays that meet objects.
         """
+        row = np.zeros(int(around["nodes"]), np.float32)
         scene, result = tables.scene.ctypes.data, np.empty((6, p.shape[1]), np.float32)
         scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
         for some in _portions(tables, p.shape[1], until_s, rays):
             given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, n, turns)]
             light = np.empty((6, given[0].shape[1]), np.float32)
-            into = None if matrix is None else matrix[some].ctypes.data
+            into: list[Any] = [None] * 4
+            if parts is not None:
+                into = [part.ctypes.data for part in (parts.begin[some.start :], *parts[1:], row)]
             start = scene, around.ctypes.data, light.shape[1], *(part.ctypes.data for part in given)
-            rest = rays, finer, light.ctypes.data, into, scratch.ctypes.data
+            rest = rays, finer, light.ctypes.data, *into, scratch.ctypes.data
             self._library.around(self.variant, *start, *rest)
             result[:, some] = light
         return result
+
+    def exchanged(self, parts: Exchange, sent: Floats) -> Floats:
+        """What nodes receive (3, M) where they send (3, M)."""
+        sent = np.ascontiguousarray(sent.T, np.float32)
+        result = np.empty_like(sent)
+        places = [part.ctypes.data for part in (*parts, sent, result)]
+        self._library.exchanged(self.variant, len(sent), *places)
+        return result.T
 
     def arriving(
         self,

@@ -21,7 +21,7 @@ import numpy as np
 
 from scenelang.compiler.spaces import FADE, Ground, Sky, Stage
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
-from scenelang.drawing.kernel import load_kernel
+from scenelang.drawing.kernel import Exchange, load_kernel
 from scenelang.drawing.solid.centres import UNKNOWN
 from scenelang.drawing.solid.emitters import Emitters
 from scenelang.drawing.solid.field import SolidField
@@ -261,18 +261,20 @@ class Around:
         shape = (3,) + (1,) * (way.ndim - 1)
         return self.horizon.reshape(shape) + (self.zenith - self.horizon).reshape(shape) * high
 
-    def _exchange(self, rays: int) -> tuple[Array, Array]:
-        """Parts of each node that nodes see (J, J) by so many rays, and what they receive of the sky, the
-        horizon and media (3, J).
+    def _exchange(self, rays: int) -> tuple[Exchange, Array]:
+        """Parts of nodes that nodes see by so many rays, and what they receive of the sky, the horizon and
+        media (3, J).
         """
-        nodes = self.nodes
-        matrix = np.zeros((self.count, self.count), np.float32)
+        nodes, near = self.nodes, max(int(self.row["near"]), 4)
         turn = SCATTER @ nodes.place[:3].astype(np.float64) % 1.0
-        found = self._received(nodes.p, nodes.n, np.stack([0 * turn + 0.5, turn]), rays, matrix=matrix)
+        most = self.count * rays * near
+        parts = Exchange(np.zeros(self.count + 1, np.int64), np.empty(most, np.int32), np.empty(most, np.float32))
+        found = self._received(nodes.p, nodes.n, np.stack([0 * turn + 0.5, turn]), rays, parts=parts)
         weight = nodes.weight[: self.first]
         within = weight * (found[3, : self.first] > 1 - 0.5 / rays)
         self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
-        return matrix, found[:3]
+        whole = slice(parts.begin[-1])
+        return Exchange(parts.begin, parts.index[whole].copy(), parts.share[whole].copy()), found[:3]
 
     def _open(self, p: Array, n: Array, nodes: Array) -> Array:
         """Whether (K,) no wall is between points (3, K) with unit normals (3, K) and nodes (K,): 1 or 0."""
@@ -287,10 +289,10 @@ class Around:
         """What nodes receive (3, J) after any number of bounces, by generalised conjugate residuals
         (Eisenstat, Elman and Schultz 1983).
         """
-        xp, colour, (matrix, escaped) = self.xp, self.nodes.colour.clip(0.0, CAP), self.exchange
+        colour, (parts, escaped) = self.nodes.colour.clip(0.0, CAP), self.exchange
 
         def through(values: Array) -> Array:
-            return product(xp, matrix, xp.packed(values.T)).T
+            return load_kernel().exchanged(parts, values)
 
         r = through(direct * colour) + escaped
         x, least, kept = 0 * r, EXACT**2 * float((r * r).sum()), list[tuple[Array, Array, float]]()
