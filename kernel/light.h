@@ -4,7 +4,7 @@
 #pragma once
 #include "cone.h"
 #include "shade.h"
-enum { MOST_NEAR = 12, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes around a place; rays of it; rays to discs
+enum { MOST_NEAR = 12, ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes around a place, whole packets of them; rays of it; rays to discs
 #define SURE 0.01f  // world units, as `MarchSettings.gap`
 #define LITTLE 0.02f  // share of a node that is worth a ray
 #define OPEN 0.02f  // of the shares of nodes around a place, that no wall hides; less is dark
@@ -14,7 +14,8 @@ enum { MOST_NEAR = 12, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes around a p
 #define RISE 0.3f  // parts of a way,
 #define HIGHEST 0.1f  // and at most, ways begin and end that walls may cross
 #define DIFFER 0.3f  // light by which nodes around a place differ,
-#define SHORT 1.2f  // and world units from a place, for which that sends rays
+#define SHORT 1.2f  // and world units from a place, for which that sends rays,
+#define NEARBY 0.2f  // in hollows
 #define LIFTED 1e-4f  // world units off a surface where rays to lamps and discs begin,
 #define OFF 1e-3f  // and those that gather,
 #define AHEAD 3e-4f  // and on their way, where rays begin
@@ -79,19 +80,18 @@ static int64_t cell_at(const Around *a, const float p[3], const float way[3]) {
 // Shares of the nodes near a place that face against a way and in whose planes it lies; their cell.
 static int64_t nodes_near(const Around *a, const float p[3], const float way[3], float *share) {
     int64_t cell = cell_at(a, p, way);
-    const int32_t *index = a->index + cell * a->near;
     float room = 0.0625f * a->side * a->side, sum = 0;
-    for (int j = 0; j < a->near; j++) {
-        const Node *o = a->node + index[j];
-        float off[3] = {o->p[0] - p[0], o->p[1] - p[1], o->p[2] - p[2]};
-        float square = room + off[0] * off[0] + off[1] * off[1] + off[2] * off[2];
-        float above = off[0] * o->n[0] + off[1] * o->n[1] + off[2] * o->n[2];
-        float facing = fmaxf(-(o->n[0] * way[0] + o->n[1] * way[1] + o->n[2] * way[2]), 0);
-        square += ASIDE_SQUARED * above * above;
-        share[j] = o->weight * (facing * facing + 1e-5f) / (square * square);
-        sum += share[j];
+    for (int j = 0; j < a->near; j += W) {
+        const float *about = a->about + cell * 7 * ROOM + j;
+        V off = {load(about, 0) - p[0], load(about, ROOM) - p[1], load(about, 2 * ROOM) - p[2]};
+        V n = {load(about, 3 * ROOM), load(about, 4 * ROOM), load(about, 5 * ROOM)};
+        F above = dot(off, n), square = room + dot(off, off) + ASIDE_SQUARED * above * above;
+        F facing = max2(-(n.x * way[0] + n.y * way[1] + n.z * way[2]), all(0));
+        F part = load(about, 6 * ROOM) * (facing * facing + 1e-5f) / (square * square);
+        for (int k = 0; k < W && j + k < a->near; k++) { share[j + k] = part[k]; sum += part[k]; }
     }
-    for (int j = 0; j < a->near; j++) share[j] /= fmaxf(sum, 1e-20f);
+    float each = 1 / fmaxf(sum, 1e-20f);
+    for (int j = 0; j < a->near; j++) share[j] *= each;
     return cell;
 }
 // Nodes of the ground around a place of it, from first to last at FAR sinh(WARP u) / sinh(WARP) along both axes.
@@ -187,7 +187,8 @@ static void ends_of(Gather *w, Level *l, int n) {
             if (!(open >> alike[j] & 1)) e->share[j] = 0;
             sum += e->share[j];
         }
-        for (int j = 0; j < e->count; j++) e->share[j] /= fmaxf(sum, OPEN);
+        float each = 1 / fmaxf(sum, OPEN);
+        for (int j = 0; j < e->count; j++) e->share[j] *= each;
     }
 }
 static void sky_of(const Around *a, float up, float light[3]) {
@@ -281,13 +282,13 @@ static void brought(Gather *w, Level *l, int n, int finer) {
         for (int d = 0; d < 3; d++) l->light.v[d][i] = e->count ? light[d] * e->kept + a->horizon[d] * (1 - e->kept) : light[d];
         if (!finer || !e->count) continue;
         float part = 1 - l->reach[i] / SHORT;
-        if (a->hollow) {  // there it takes long, and gains little
+        if (a->hollow) {
             for (int j = 0; j < e->count; j++) {
                 const float *sent = a->node[e->index[j]].sent;
                 float off = sent[0] + sent[1] + sent[2] - (light[0] + light[1] + light[2]);
                 spread += e->share[j] * off * off;
             }
-            part = sqrtf(spread) / DIFFER - 1;
+            part = fmaxf(1 - l->reach[i] / NEARBY, sqrtf(spread) / DIFFER - 1);
         }
         if (!(part > 0)) continue;
         for (int j = 0; j < e->count; j++) for (int d = 0; d < 3; d++) colour[d] += e->share[j] * a->node[e->index[j]].colour[d];

@@ -69,5 +69,6 @@ typedef struct {  // light from everywhere, as scenelang/drawing/solid/around.py
     const Node *node;
     const int32_t *index;  // nodes of cells, and for hollows whether no wall is between each and the first
     const uint8_t *alike;
+    const float *about;  // places, normals and weights (7, 16) of the nodes of cells
     const float *lamp, *haze, *disc;  // places, powers and radii; light and density; places, normals, light and areas
 } Around;

@@ -83,7 +83,7 @@ NODE = _dtype("f4 p[3] n[3] sent[3] colour[3] weight")
 AROUND = _dtype(
     "f4 low[3] side horizon[3] zenith[3] floor fade scale warp corner[3] spacing",
     "i4 nodes first near counts[3] ground grounded hollow lamps sides[3] steps discs",
-    "u8 node index alike lamp haze disc",
+    "u8 node index alike about lamp haze disc",
 )
 
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball

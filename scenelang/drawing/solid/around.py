@@ -122,6 +122,10 @@ class Lookup:
         self.index = np.concatenate(found, dtype=np.int32)  # (6 cells, k)
         # whether no wall is between nodes and the first of their cell (6 cells, k)
         self.alike = np.zeros(self.index.shape, np.uint8)
+        # positions, normals and weights of a cell's nodes, in whole packets (6 cells, 7, 16)
+        self.about = np.zeros((len(self.index), 7, 16), np.float32)
+        rows = np.concatenate([nodes.p, nodes.n, nodes.weight[None]])[:, self.index]
+        self.about[:, :, : self.index.shape[1]] = rows.swapaxes(0, 1)
 
 class Seen(NamedTuple):
     """Points of the eye's rays on a lattice of the picture, row by row."""
@@ -190,7 +194,7 @@ class Around:
         row["nodes"], row["first"], row["lamps"], row["discs"] = self.count, self.first, len(lamps), len(self.emitters.discs)
         row["hollow"] = self.hollow
         if lookup is not None:
-            tables |= {"index": lookup.index, "alike": lookup.alike}
+            tables |= {"index": lookup.index, "alike": lookup.alike, "about": lookup.about}
             row["low"], row["side"], row["counts"], row["near"] = lookup.low, lookup.side, lookup.counts, lookup.index.shape[1]
         if ground is not None:
             row["grounded"], row["floor"], row["ground"] = 1, ground.y, isqrt(self.count - self.first)
