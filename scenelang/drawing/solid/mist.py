@@ -46,7 +46,7 @@ HALF_UP = 0.135  # share of the zenith's colour in directions about the horizont
 STEPS = 8, 24  # through media of light for surfaces, and of what has lamps within
 GAP = 0.03  # world units, as of `MarchSettings`
 
-AROUND: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
+NEIGHBOURS: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
 SHARES: Final = {1: 1 / 15, 3: 3 / 40}, {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}  # of directions, by their steps
 
 
@@ -112,7 +112,7 @@ class Mist:
         looks = np.concatenate([colour.clip(0.0, ALBEDO), glow, density[None]]) * self.mist
         # nodes around media have what those next to them have
         self.count, hard = 0 * d, np.float32(1) * self.opaque
-        for shift in AROUND:
+        for shift in NEIGHBOURS:
             to, on = pair_of(self.sides, shift)
             hard[to] += self.opaque[on]
             self.count[to] += self.mist[on]
@@ -147,7 +147,7 @@ class Mist:
         """Set values (R, n…) of the nodes wanted (n…,) to the mean of their neighbours' in media, if any."""
         some, flat = np.flatnonzero(wanted), values.reshape(len(values), -1)
         dense = flat * self.mist.reshape(-1)
-        around = sum(dense.take(some + far, 1, mode="wrap") for far in np.dot(AROUND, self.strides))
+        around = sum(dense.take(some + far, 1, mode="wrap") for far in np.dot(NEIGHBOURS, self.strides))
         flat[:, some] = around / self.count.reshape(-1)[some].clip(1.0)
 
     def _reached(self, light: Light, p: np.ndarray) -> np.ndarray:
@@ -164,7 +164,7 @@ class Mist:
     def _segments(self) -> None:
         """Integrate along the ways from all nodes to their neighbours."""
         self.segments, sides, d, mist, shares = [], self.sides, self.d, self.mist, SHARES[self.lit]
-        self.directions = [d for d in AROUND if sum(map(abs, d)) in shares]
+        self.directions = [d for d in NEIGHBOURS if sum(map(abs, d)) in shares]
         for shift in self.directions:
             steps = sum(map(abs, shift))
             to, on = pair_of(sides, shift)
