@@ -16,7 +16,7 @@
                    float *, int64_t *, void *); \
     void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *); \
     void around_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, int32_t, int32_t, float *, \
-                    int64_t *, int32_t *, float *, float *, void *); \
+                    int64_t *, int32_t *, float *, float *, int64_t *, void *); \
     void exchanged_##v(int64_t, const int64_t *, const int32_t *, const float *, const float *, float *); \
     void arriving_##v(const Scene *, const Around *, int64_t, const float *, const float *, int32_t, float *, float *, void *); \
     int64_t glowing_##v(const Scene *, const Around *, int64_t, const float *, const float *, float, float *, float *, int32_t *, \
@@ -79,8 +79,9 @@ OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, i
     PICK(shade, s, stage, n, across, way, light, alpha, counts, memory);
 }
 OUT void around(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn,
-                int32_t rays, int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, void *memory) {
-    PICK(around, s, a, n, p, normal, turn, rays, finer, light, begin, index, share, row, memory);
+                int32_t rays, int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, int64_t *counts,
+                void *memory) {
+    PICK(around, s, a, n, p, normal, turn, rays, finer, light, begin, index, share, row, counts, memory);
 }
 OUT void exchanged(int32_t variant, int64_t n, const int64_t *begin, const int32_t *index, const float *share, const float *sent,
                    float *received) {

@@ -246,20 +246,23 @@ void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, 
     counts[0] = w.lights; counts[1] = w.near; counts[2] = w.steps; counts[3] = w.met; counts[4] = w.lost;
 }
 static Gather gathering(const Scene *s, const Around *a, void *scratch) {
-    Gather w = {s, a, aligned(scratch), 0, 0, 0};
+    Gather w = {s, a, aligned(scratch), 0, 0, 0, 0};
     w.list = (int32_t *)(w.slot + s->objects + 1);
     w.level = aligned(w.list + s->objects + 1);
     for (int i = 0; i < s->objects; i++) w.list[i] = i;
     return w;
 }
 // Light (6, n) from everywhere, as of `gathered`, that n points with unit normals (3, n) receive by so many rays; or, unless
-// `begin` (n + 1) is null, the parts of nodes that they see, from where the first begins on.
+// `begin` (n + 1) is null, the parts of nodes that they see, from where the first begins on. Counts are of rays and of pairs
+// of points and objects.
 void NAME(around)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn, int32_t rays,
-                  int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, void *scratch) {
+                  int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, int64_t counts[2],
+                  void *scratch) {
     Scene own = *s;
     own.coloured = 0;
     Gather w = gathering(&own, a, scratch);
     gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, begin ? &(Exchange){begin, index, share, row} : 0);
+    counts[0] = w.rays; counts[1] = w.met;
 }
 // Light (3, n) that comes to n points (3, n) from unit directions, without media, and from how far (n).
 void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer, float *light,

@@ -44,7 +44,12 @@ _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
     **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
-    **{"around": ("ipplpppiipppppp", ""), "exchanged": ("ilppppp", ""), "arriving": ("ipplppippp", ""), "glowing": ("ipplppfpppplp", "l")},
+    **{
+        "around": ("ipplpppiippppppp", ""),
+        "exchanged": ("ilppppp", ""),
+        "arriving": ("ipplppippp", ""),
+        "glowing": ("ipplppfpppplp", "l"),
+    },
     **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
 }
@@ -172,9 +177,9 @@ class Kernel:
     def crossings(
         self, tables: Tables, objects: npt.NDArray[np.integer], begin: Floats, way: Floats, *parts: Floats
     ) -> tuple[npt.NDArray[np.int32], Floats]:
-        """Lines (k,), of those that begin at (3, M) and go all the way (3, M), that meet the surfaces of objects
-        alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long as the
-        distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
+        """Lines (k,), of those that begin at (3, M) and go all the way (3, M), that meet the surfaces of
+        objects alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long as
+        the distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
         """
         numbers = np.ascontiguousarray(objects, np.int32)
         given = [np.ascontiguousarray(part, np.float32) for part in (begin, way, *parts)]
@@ -316,15 +321,16 @@ class Kernel:
         finer: bool = False,
         parts: Exchange | None = None,
         until_s: float = NEVER,
-    ) -> Floats:
-        """Light that points (3, M) with unit normals (3, M) receive by so many rays, by the tables of an `AROUND`
-        row, and how far halves of these are from it (6, M). Turns (2, M) tell points apart. If ``finer``,
-        some rays send others where they end.
+    ) -> tuple[Floats, int, int]:
+        """Light that points (3, M) with unit normals (3, M) receive by so many rays, by the tables of an
+        `AROUND` row, and how far halves of these are from it (6, M). Turns (2, M) tell points apart. If
+        ``finer``, some rays send others where they end. All of these, and pairs of points and objects, are
+        counted.
 
         With ``parts`` those of nodes that are seen are written there, and the result is what comes from
         elsewhere, then the part of rays that meet objects.
         """
-        row = np.zeros(int(around["nodes"]), np.float32)
+        row, counts = np.zeros(int(around["nodes"]), np.float32), np.zeros((2, 2), np.int64)
         scene, result = tables.scene.ctypes.data, np.empty((6, p.shape[1]), np.float32)
         scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
         for some in _portions(tables, p.shape[1], until_s, rays):
@@ -334,10 +340,12 @@ class Kernel:
             if parts is not None:
                 into = [part.ctypes.data for part in (parts.begin[some.start :], *parts[1:], row)]
             start = scene, around.ctypes.data, light.shape[1], *(part.ctypes.data for part in given)
-            rest = rays, finer, light.ctypes.data, *into, scratch.ctypes.data
+            rest = rays, finer, light.ctypes.data, *into, counts[0].ctypes.data, scratch.ctypes.data
             self._library.around(self.variant, *start, *rest)
             result[:, some] = light
-        return result
+            counts[1] += counts[0]
+        asked, met = counts[1].tolist()
+        return result, asked, met
 
     def exchanged(self, parts: Exchange, sent: Floats) -> Floats:
         """What nodes receive (3, M) where they send (3, M)."""
@@ -356,8 +364,8 @@ class Kernel:
         finer: bool = False,
         until_s: float = NEVER,
     ) -> tuple[Floats, Floats]:
-        """Light (3, M) that comes to points (3, M) from unit directions (3, M), without media, and from how far;
-        the rest as of `around`.
+        """Light (3, M) that comes to points (3, M) from unit directions (3, M), without media, and from how
+        far; the rest as of `around`.
         """
         scene, count = tables.scene.ctypes.data, p.shape[1]
         light, reach = np.empty((3, count), np.float32), np.empty(count, np.float32)
@@ -374,8 +382,8 @@ class Kernel:
     def haze(
         self, tables: Tables, around: Rows, p: Floats, way: Floats, reach: Floats
     ) -> tuple[Floats, Floats]:
-        """Light (3, M) of media along rays from points (3, M) in unit directions (3, M) from as far as a reach
-        (M,), by the tables of an `AROUND` row, and the part (M,) that they let through.
+        """Light (3, M) of media along rays from points (3, M) in unit directions (3, M) from as far as a
+        reach (M,), by the tables of an `AROUND` row, and the part (M,) that they let through.
         """
         given = [np.ascontiguousarray(part, np.float32) for part in (p, way, reach)]
         scene, clear = tables.scene.ctypes.data, np.empty_like(given[2])
@@ -386,9 +394,9 @@ class Kernel:
         return light, clear
 
     def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
-        """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M) with
-        unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness, unit ways
-        back, and what they reflect along the normal, in threes.
+        """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M)
+        with unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness, unit
+        ways back, and what they reflect along the normal, in threes.
         """
         at, p, n, coat = (np.ascontiguousarray(part, np.float32) for part in (at, p, n, coat))
         result = np.empty_like(coat[4:])
@@ -410,8 +418,8 @@ class Kernel:
         drawn: int = 0,
         until_s: float = NEVER,
     ) -> tuple[Floats, Floats, npt.NDArray[np.int32], Floats]:
-        """Light (3, M) of discs at points (3, M) with unit normals (3, M), or surfaces that face each disc, if
-        nothing hides it, and the parts (3, M) that arrive, if asked, by fewer rays where less is received
+        """Light (3, M) of discs at points (3, M) with unit normals (3, M), or surfaces that face each disc,
+        if nothing hides it, and the parts (3, M) that arrive, if asked, by fewer rays where less is received
         than ``worth``. Of so many of these rays from each point numbers (k,) of points, and unit ways and
         light that arrives (6, k).
         """

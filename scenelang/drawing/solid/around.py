@@ -127,6 +127,7 @@ class Lookup:
         rows = np.concatenate([nodes.p, nodes.n, nodes.weight[None]])[:, self.index]
         self.about[:, :, : self.index.shape[1]] = rows.swapaxes(0, 1)
 
+
 class Seen(NamedTuple):
     """Points of the eye's rays on a lattice of the picture, row by row."""
 
@@ -183,26 +184,38 @@ class Around:
 
     def _tell(self, sent: Array) -> None:
         """Make the tables of the kernel's `Around`, of what nodes send (3, J)."""
-        nodes, lookup, ground, mist = self.nodes, self.lookup, self.stage.ground, self.mist
+        nodes, lookup, ground, emitters = self.nodes, self.lookup, self.stage.ground, self.emitters
         row, own = np.zeros((), AROUND), np.zeros(self.count, NODE)
         for name, part in (("p", nodes.p), ("n", nodes.n), ("sent", sent), ("colour", nodes.colour)):
             own[name] = part.T
         own["weight"] = nodes.weight
-        lamps = [[*light.position, *(light.power * c for c in light.rgb), light.radius] for light in self.stage.lights]
-        tables = {"node": own, "lamp": np.array(lamps, np.float32), "disc": self.emitters.discs}
-        row["horizon"], row["zenith"], row["fade"] = self.horizon[:, 0], self.zenith[:, 0], FADE
-        row["nodes"], row["first"], row["lamps"], row["discs"] = self.count, self.first, len(lamps), len(self.emitters.discs)
-        row["hollow"] = self.hollow
+        lamps = [
+            [*lamp.position, *(lamp.power * np.array(lamp.rgb)), lamp.radius] for lamp in self.stage.lights
+        ]
+        tables = {"node": own, "lamp": np.array(lamps, np.float32), "disc": emitters.discs}
+        values = {
+            "horizon": self.horizon[:, 0],
+            "zenith": self.zenith[:, 0],
+            "fade": FADE,
+            "nodes": self.count,
+        }
+        values |= {
+            "first": self.first,
+            "lamps": len(lamps),
+            "discs": len(emitters.discs),
+            "hollow": self.hollow,
+        }
         if lookup is not None:
             tables |= {"index": lookup.index, "alike": lookup.alike, "about": lookup.about}
-            row["low"], row["side"], row["counts"], row["near"] = lookup.low, lookup.side, lookup.counts, lookup.index.shape[1]
+            values |= {"low": lookup.low, "side": lookup.side, "counts": lookup.counts}
+            values["near"] = lookup.index.shape[1]
         if ground is not None:
-            row["grounded"], row["floor"], row["ground"] = 1, ground.y, isqrt(self.count - self.first)
-            row["scale"], row["warp"] = np.sinh(WARP) / FAR, WARP
-        if mist is not None:
-            mist.tell(row)
-        for name, table in tables.items():
-            row[name] = table.ctypes.data
+            values |= {"grounded": 1, "floor": ground.y, "ground": isqrt(self.count - self.first)}
+            values |= {"scale": np.sinh(WARP) / FAR, "warp": WARP}
+        for name, value in (values | {name: table.ctypes.data for name, table in tables.items()}).items():
+            row[name] = value
+        if self.mist is not None:
+            self.mist.tell(row)
         self.row, self.tables = row, tables  # the row points to these
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
@@ -272,7 +285,9 @@ class Around:
         nodes, near = self.nodes, max(int(self.row["near"]), 4)
         turn = SCATTER @ nodes.place[:3].astype(np.float64) % 1.0
         most = self.count * rays * near
-        parts = Exchange(np.zeros(self.count + 1, np.int64), np.empty(most, np.int32), np.empty(most, np.float32))
+        parts = Exchange(
+            np.zeros(self.count + 1, np.int64), np.empty(most, np.int32), np.empty(most, np.float32)
+        )
         found = self._received(nodes.p, nodes.n, np.stack([0 * turn + 0.5, turn]), rays, parts=parts)
         weight = nodes.weight[: self.first]
         within = weight * (found[3, : self.first] > 1 - 0.5 / rays)
@@ -369,12 +384,14 @@ class Around:
         """Light that points (3, K) with unit normals receive by so many rays, which numbers (2, K) turn, and
         how far halves of these are from it (6, K).
         """
-        return self._received(p, n, (TURNS @ numbers + 0.5) % 1.0, rays, finer=finer and not self.emitters.there)
+        return self._received(
+            p, n, (TURNS @ numbers + 0.5) % 1.0, rays, finer=finer and not self.emitters.there
+        )
 
     def _received(self, p: Array, n: Array, turns: np.ndarray, rays: int, **more: Any) -> Array:
-        """As of `Kernel.around`."""
+        """The light of `Kernel.around`."""
         until = self.field.network.until_s
-        return load_kernel().around(self.field.tables, self.row, p, n, turns, rays, until_s=until, **more)
+        return load_kernel().around(self.field.tables, self.row, p, n, turns, rays, until_s=until, **more)[0]
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If

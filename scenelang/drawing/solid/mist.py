@@ -280,7 +280,12 @@ class Mist:
 
     def tell(self, row: Rows) -> None:
         """Write what the kernel's `Around` knows of media into its row, which points to what is kept here."""
-        row["corner"], row["spacing"], row["sides"], row["steps"] = self.low, self.h, self.sides, STEPS[self.lit]
+        row["corner"], row["spacing"], row["sides"], row["steps"] = (
+            self.low,
+            self.h,
+            self.sides,
+            STEPS[self.lit],
+        )
         row["haze"] = self.haze.ctypes.data
 
     def along(self, p: Array, way: Array, reach: Array) -> tuple[Array, Array]:
