@@ -83,7 +83,7 @@ class Exchange(NamedTuple):
     """Parts of nodes that M nodes see."""
 
     begin: npt.NDArray[np.int64]  # (M + 1,) where those that each sees begin
-    index: npt.NDArray[np.int32]  # (k,) which these are
+    node: npt.NDArray[np.int32]  # (k,) which these are
     share: Floats  # (k,)
 
 
@@ -175,11 +175,16 @@ class Kernel:
         return result
 
     def crossings(
-        self, tables: Tables, objects: npt.NDArray[np.integer], begin: Floats, way: Floats, *parts: Floats
+        self,
+        tables: Tables,
+        objects: npt.NDArray[np.integer],
+        begin: Floats,
+        way: Floats,
+        *parts: npt.NDArray[Any],
     ) -> tuple[npt.NDArray[np.int32], Floats]:
         """Lines (k,), of those that begin at (3, M) and go all the way (3, M), that meet the surfaces of
-        objects alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long as
-        the distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
+        objects alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long
+        as the distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
         """
         numbers = np.ascontiguousarray(objects, np.int32)
         given = [np.ascontiguousarray(part, np.float32) for part in (begin, way, *parts)]
@@ -395,8 +400,8 @@ class Kernel:
 
     def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
         """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M)
-        with unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness, unit
-        ways back, and what they reflect along the normal, in threes.
+        with unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness,
+        unit ways back, and what they reflect along the normal, in threes.
         """
         at, p, n, coat = (np.ascontiguousarray(part, np.float32) for part in (at, p, n, coat))
         result = np.empty_like(coat[4:])

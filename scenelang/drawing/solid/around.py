@@ -293,7 +293,7 @@ class Around:
         within = weight * (found[3, : self.first] > 1 - 0.5 / rays)
         self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
         whole = slice(parts.begin[-1])
-        return Exchange(parts.begin, parts.index[whole].copy(), parts.share[whole].copy()), found[:3]
+        return Exchange(parts.begin, parts.node[whole].copy(), parts.share[whole].copy()), found[:3]
 
     def _open(self, p: Array, n: Array, nodes: Array) -> Array:
         """Whether (K,) no wall is between points (3, K) with unit normals (3, K) and nodes (K,): 1 or 0."""
@@ -331,7 +331,7 @@ class Around:
 
     def _floored(self, at: Array) -> Array:
         """What the ground sends (3, K) from points (3, K) of it."""
-        up = np.float32([[0], [1], [0]]) + 0 * at
+        up = np.array([[0], [1], [0]], np.float32) + 0 * at
         return self.arriving(at + OFF * up, -up)[0]
 
     def surface(self, p: Array, n: Array, last: bool = True) -> Array:
