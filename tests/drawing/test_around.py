@@ -218,6 +218,13 @@ def test_no_light_comes_into_what_is_closed(sky: str) -> None:
     assert np.all(around.seen.received == 0)
 
 
+def test_nodes_on_the_outside_of_a_thin_slab_see_all_of_the_sky() -> None:
+    """There distances are small for their gradient, and rays that begin too near met their own surface."""
+    around = around_of(f"""nsg 1; canvas(24, 24); ground(none); light(none); sky(2, #fff, #fff);
+        box {{ scale(1, 0.03, 1); {GREY} }}""")
+    assert around.exchange[1] == pytest.approx(np.full_like(around.exchange[1], 2.0), rel=0.01)
+
+
 @pytest.mark.parametrize("rgb", ["#808080", "#f0f0f0"])
 def test_in_a_hollow_all_bounces_add_up(rgb: str) -> None:
     """Within a closed hollow of albedo a that glows with e there is e / (1 - a) everywhere."""

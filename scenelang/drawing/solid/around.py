@@ -2,6 +2,7 @@
 
 1. *Nodes* (`nodes.py`) on objects and ground are lit by lamps. Rays from each, the same in every picture,
    find what it sees; what nodes send to nodes is a matrix, and its fixed point has all bounces (radiosity).
+   The kernel (`light.h`) sends rays, looks up nodes around their ends, and sums what comes.
 2. From the points of a lattice on the picture rays go all over the hemisphere (final gathering). Nodes around
    where they end say what comes from there.
 3. Points of the lattice share what they receive with those around on the same surface. Pixels between take
