@@ -75,7 +75,7 @@ PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
 # rays sent for each that gathers light, and where walls may hide nodes; from each pixel that mirrors; media;
 # the share of rays of the ground that meet media
-PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 7.0, (1.0, 1.5), 10, 2e6, 0.2
+PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 2.0, (1.0, 1.5), 10, 2e6, 0.2
 CELLS = 8  # of the grid of nodes, along its longest side
 
 
