@@ -14,6 +14,7 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -105,7 +106,15 @@ def light_up(
     given |= {"alike": rng.integers(0, 2, (cells, near), np.uint8)}
     sizes = {"about": (cells, 7, 16), "lamp": (2, 7), "disc": (3, 10), "haze": (int(sides.prod()), 4)}
     given |= {name: (rng.normal(size=size) * wild).astype(np.float32) for name, size in sizes.items()}
-    values = {"side": 0.5, "scale": 2.0, "warp": 4.5, "spacing": 0.3, "fade": 64.0, "first": 9, "near": near}
+    values: dict[str, Any] = {
+        "side": 0.5,
+        "scale": 2.0,
+        "warp": 4.5,
+        "spacing": 0.3,
+        "fade": 64.0,
+        "first": 9,
+        "near": near,
+    }
     values |= {"nodes": len(nodes), "ground": ground, "grounded": 1, "floor": -1.0, "lamps": 2, "discs": 3}
     values |= {"steps": 3, "hollow": rng.integers(2)}
     values |= {name: part.ctypes.data for name, part in given.items()}

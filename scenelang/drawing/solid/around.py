@@ -167,7 +167,7 @@ class Around:
         """Place the nodes, and find what they see."""
         xp, field, stage = self.xp, self.field, self.stage
         own, floor = on_objects(field, stage, self.hollow), on_ground(field, stage, self.hollow)
-        self.emitters = Emitters(field, own)
+        self.emitters = Emitters(own)
         kept = xp.where(own.place[4] > 0)
         own = Nodes(*(xp.take(part, kept) for part in own))
         self.first = own.p.shape[1]  # node of the ground

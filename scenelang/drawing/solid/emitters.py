@@ -1,9 +1,10 @@
 """Surfaces that glow, as light for others: what is small and bright is what cones and few rays miss.
 
 Nodes on what glows (`nodes.py`) are put together to discs. A point receives the form factors of these. Rays
-to some, drawn by what they send there and anew from point to point, tell how much of that is free.
+to some, drawn by what they send there and anew from point to point, tell how much of that is free; the
+kernel sums both (`light.h`).
 
-Letters: J nodes, K points, D discs.
+Letters: J nodes, D discs.
 """
 
 from __future__ import annotations
@@ -12,7 +13,6 @@ from math import ceil, log2
 
 import numpy as np
 
-from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.nodes import Nodes
 
 DISCS = 1024  # of all that glows
@@ -22,10 +22,9 @@ TURNED = 0.3  # how far apart opposite normals count, twice
 class Emitters:
     """The nodes that glow, as discs."""
 
-    def __init__(self, field: SolidField, nodes: Nodes) -> None:
-        self.field, self.xp = field, field.xp
+    def __init__(self, nodes: Nodes) -> None:
         parts = (nodes.p, nodes.n, nodes.glow, nodes.area, nodes.place)
-        p, n, glow, area, place = (np.asarray(self.xp.to_numpy(part), np.float64) for part in parts)
+        p, n, glow, area, place = (np.asarray(part, np.float64) for part in parts)
         bright = np.flatnonzero(glow.max(0) > 0)
         # halved as it is in the objects' spaces, which they take along where they move
         apart = np.concatenate([place[:3], TURNED * place[5:]]).round(3)[:, bright]
