@@ -14,6 +14,7 @@ import sys
 import tempfile
 from dataclasses import replace
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
@@ -21,9 +22,9 @@ from fuzz.tensors import FLOATS
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.closed import field_of
-from scenelang.drawing.kernel import Kernel
+from scenelang.drawing.kernel import Exchange, Kernel
 from scenelang.drawing.solid.march import MARCH_SETTINGS
-from scenelang.drawing.tables import Tables, stage_rows
+from scenelang.drawing.tables import AROUND, NODE, Tables, stage_rows
 from scenelang.language.evaluation import load
 from scenelang.language.reports import SceneError
 
@@ -93,6 +94,52 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
         )
         stage["eye"], lamps["at"] = p[:, 0], p[:, 1 : 1 + len(lamps)].T
         kernel.shade(tables, stage, range(height))
+    light_up(kernel, tables, p, way, rng)
+
+
+@np.errstate(all="ignore")
+def light_up(
+    kernel: Kernel, tables: Tables, p: np.ndarray, way: np.ndarray, rng: np.random.Generator
+) -> None:
+    """Ask for light from everywhere at points (3, M), by nodes, lamps, discs and media of any numbers."""
+    wild = 10.0 ** rng.integers(-3, 9)
+    row, ground, near, counts = np.zeros((), AROUND), int(rng.integers(2, 5)), 5, rng.integers(1, 4, 3)
+    nodes, sides, cells = np.zeros(9 + ground**2, NODE), rng.integers(2, 5, 3), 6 * int(counts.prod())
+    for name in NODE.names or ():
+        nodes[name] = rng.normal(size=nodes[name].shape) * wild
+    given = {"node": nodes, "index": rng.integers(0, 9, (cells, near), np.int32)}
+    given |= {"alike": rng.integers(0, 2, (cells, near), np.uint8)}
+    sizes = {"about": (cells, 7, 16), "lamp": (2, 7), "disc": (3, 10), "haze": (int(sides.prod()), 4)}
+    given |= {name: (rng.normal(size=size) * wild).astype(np.float32) for name, size in sizes.items()}
+    values: dict[str, Any] = {
+        "side": 0.5,
+        "scale": 2.0,
+        "warp": 4.5,
+        "spacing": 0.3,
+        "fade": 64.0,
+        "first": 9,
+        "near": near,
+    }
+    values |= {"nodes": len(nodes), "ground": ground, "grounded": 1, "floor": -1.0, "lamps": 2, "discs": 3}
+    values |= {"steps": 3, "hollow": rng.integers(2)}
+    values |= {name: part.ctypes.data for name, part in given.items()}
+    if rng.random() < 0.5:
+        del values["haze"]
+    for name, value in (values | {"counts": counts, "sides": sides}).items():
+        row[name] = value
+    place = np.array([0.0, 1.0, np.inf, np.nan])[rng.integers(0, 4)]
+    row["low"], row["corner"], row["horizon"] = place, place, wild
+    begin, room = np.zeros(p.shape[1] + 1, np.int64), p.shape[1] * 3 * near
+    parts = Exchange(begin, np.empty(room, np.int32), np.empty(room, np.float32))
+    kernel.around(tables, row, p, way, way, 3, parts=parts)
+    kernel.around(tables, row, p, way, way, 3, finer=True)
+    kernel.arriving(tables, row, p, way, True)
+    kernel.glowing(tables, row, p, way, float(rng.choice([0.0, 1.0, np.inf])), drawn=int(rng.integers(0, 34)))
+    if "haze" in values:
+        kernel.haze(tables, row, p, way, abs(p[0]))
+    kernel.mirrored(p[:, 0], float(rng.choice([0.0, 0.5])), p, way, np.concatenate([p, way, p])[:7])
+    objects = np.sort(rng.integers(0, int(tables.scene["objects"]), p.shape[1]))
+    kernel.crossings(tables, objects, p, way, abs(p[1]), np.full(p.shape[1], 0.1))
 
 
 def programs() -> list[Program]:

@@ -15,7 +15,17 @@
     void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
                    float *, int64_t *, void *); \
     void shade_##v(const Scene *, const Stage *, int32_t, int32_t, int32_t, int32_t, float *, int64_t *, void *); \
-    void finish_##v(const Scene *, const Stage *, int32_t, int32_t, int32_t, int32_t, const float *, int32_t *, float *, int64_t *, void *);
+    void finish_##v(const Scene *, const Stage *, int32_t, int32_t, int32_t, int32_t, const float *, int32_t *, float *, int64_t *, void *); \
+    void around_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, int32_t, int32_t, float *, \
+                    int64_t *, int32_t *, float *, float *, int64_t *, void *); \
+    void exchanged_##v(int64_t, const int64_t *, const int32_t *, const float *, const float *, float *); \
+    void arriving_##v(const Scene *, const Around *, int64_t, const float *, const float *, int32_t, float *, float *, void *); \
+    int64_t glowing_##v(const Scene *, const Around *, int64_t, const float *, const float *, float, float *, float *, int32_t *, \
+                        float *, int64_t, void *); \
+    void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *); \
+    int64_t crossings_##v(const Scene *, int64_t, const int32_t *, const float *, const float *, const float *, const float *, int64_t, \
+                          int32_t *, float *); \
+    void mirrored_##v(int64_t, const float *, float, const float *, const float *, const float *, const float *, const float *, float *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -43,9 +53,9 @@ OUT int32_t newest(void) { return 0; }
 OUT const char *mark(void) { return MARK; }  // a digest of the sources
 // What tables.py has to agree with.
 OUT void sizes(int32_t r[9]) {
-    size_t all[9] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
-                     sizeof(Lamp), sizeof(Stage)};
-    for (int i = 0; i < 9; i++) r[i] = (int32_t)all[i];
+    size_t all[11] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
+                     sizeof(Lamp), sizeof(Stage), sizeof(Node), sizeof(Around)};
+    for (int i = 0; i < 11; i++) r[i] = (int32_t)all[i];
 }
 OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); }
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
@@ -72,4 +82,33 @@ OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int32_t top,
 OUT void finish(int32_t variant, const Scene *s, const Stage *stage, int32_t top, int32_t bottom, int32_t first, int32_t last,
                 const float *picture, int32_t *pixel, float *out, int64_t *counts, void *memory) {
     PICK(finish, s, stage, top, bottom, first, last, picture, pixel, out, counts, memory);
+}
+OUT void around(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn,
+                int32_t rays, int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, int64_t *counts,
+                void *memory) {
+    PICK(around, s, a, n, p, normal, turn, rays, finer, light, begin, index, share, row, counts, memory);
+}
+OUT void exchanged(int32_t variant, int64_t n, const int64_t *begin, const int32_t *index, const float *share, const float *sent,
+                   float *received) {
+    PICK(exchanged, n, begin, index, share, sent, received);
+}
+OUT void arriving(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer,
+                  float *light, float *reach, void *memory) {
+    PICK(arriving, s, a, n, p, way, finer, light, reach, memory);
+}
+OUT int64_t glowing(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth,
+                    float *light, float *free, int32_t *point, float *ray, int64_t room, void *memory) {
+    return PICK(glowing, s, a, n, p, normal, worth, light, free, point, ray, room, memory);
+}
+OUT void haze(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach,
+              float *light, float *clear, void *memory) {
+    PICK(haze, s, a, n, p, way, reach, light, clear, memory);
+}
+OUT int64_t crossings(int32_t variant, const Scene *s, int64_t n, const int32_t *object, const float *p, const float *way,
+                      const float *rate, const float *least, int64_t room, int32_t *line, float *along) {
+    return PICK(crossings, s, n, object, p, way, rate, least, room, line, along);
+}
+OUT void mirrored(int32_t variant, int64_t n, const float *at, float radius, const float *p, const float *normal, const float *rough,
+                  const float *back, const float *straight, float *light) {
+    PICK(mirrored, n, at, radius, p, normal, rough, back, straight, light);
 }

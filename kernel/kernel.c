@@ -1,15 +1,14 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
 #include "band.h"
+#include "light.h"
 #ifndef NAME
 #define NAME(x) x
 #endif
 
 // Bytes of scratch that calls need.
-int64_t NAME(scratch)(const Scene *s) { return room_of(s); }
-
-IN void store(float *to, int64_t n, int64_t at, F values) {
-    if (at + W <= n) memcpy(to + at, &values, sizeof values);
-    else memcpy(to + at, &values, 4 * (size_t)(n - at));
+int64_t NAME(scratch)(const Scene *s) {
+    int64_t light = 192 + (int64_t)(sizeof(Slot) + sizeof(int32_t)) * (s->objects + 1) + 2 * (int64_t)sizeof(Level);
+    return light > room_of(s) ? light : room_of(s);
 }
 IN int64_t asked(const Scene *s, int64_t n, const float *p, const float *reach, float *distance, float *gradient,
                  float *look, int32_t *owner, void *scratch, const int wanted) {
@@ -158,4 +157,120 @@ void NAME(finish)(const Scene *s, const Stage *stage, int32_t top, int32_t botto
     Job j = job_of(s, stage, scratch);
     finished(&j, top, bottom, first, last, picture, pixel, out);
     counted(&j, counts);
+}
+static Gather gathering(const Scene *s, const Around *a, void *scratch) {
+    Gather w = {s, a, aligned(scratch), 0, 0, 0, 0};
+    w.list = (int32_t *)(w.slot + s->objects + 1);
+    w.level = aligned(w.list + s->objects + 1);
+    for (int i = 0; i < s->objects; i++) w.list[i] = i;
+    return w;
+}
+// Light (6, n) from everywhere, as of `gathered`, that n points with unit normals (3, n) receive by so many rays; or, unless
+// `begin` (n + 1) is null, the parts of nodes that they see, from where the first begins on. Counts are of rays and of pairs
+// of points and objects.
+void NAME(around)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn, int32_t rays,
+                  int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, int64_t counts[2],
+                  void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, begin ? &(Exchange){begin, index, share, row} : 0);
+    counts[0] = w.rays; counts[1] = w.met;
+}
+// Light (3, n) that comes to n points (3, n) from unit directions, without media, and from how far (n).
+void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer, float *light,
+                    float *reach, void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    for (int64_t from = 0; from < n; from += BEAM) {
+        int some = (int)(n - from < BEAM ? n - from : BEAM);
+        for (int d = 0; d < 3; d++) for (int i = 0; i < some; i++) {
+            w.level->ray.from.v[d][i] = p[d * n + from + i];
+            w.level->ray.way.v[d][i] = way[d * n + from + i];
+        }
+        brought(&w, w.level, some, finer);
+        for (int d = 0; d < 3; d++) memcpy(light + d * n + from, w.level->light.v[d], 4 * (size_t)some);
+        memcpy(reach + from, w.level->reach, 4 * (size_t)some);
+    }
+}
+// Light of what glows at n points, as of `glowing`; the number of rays that there was room for.
+int64_t NAME(glowing)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth, float *light,
+                      float *free, int32_t *point, float *ray, int64_t room, void *scratch) {
+    Scene own = *s;
+    own.coloured = 0;
+    Gather w = gathering(&own, a, scratch);
+    int64_t count = 0;
+    glowing(&w, n, p, normal, worth, light, free, point, ray, room, &count);
+    return count;
+}
+// Light (3, n) of media along n rays from points (3, n) from as far as a reach (n), and what these let through (n).
+void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach, float *light,
+                float *clear, void *scratch) {
+    Level *l = gathering(s, a, scratch).level;
+    for (int64_t from = 0; from < n; from += BEAM) {
+        int some = (int)(n - from < BEAM ? n - from : BEAM);
+        for (int d = 0; d < 3; d++) for (int i = 0; i < BEAM; i++) {
+            int64_t j = from + (i < some ? i : some - 1);
+            l->ray.from.v[d][i] = p[d * n + j]; l->ray.way.v[d][i] = way[d * n + j]; l->reach[i] = reach[j];
+        }
+        haze_of(a, l, some);
+        for (int d = 0; d < 3; d++) memcpy(light + d * n + from, l->haze.v[d], 4 * (size_t)some);
+        memcpy(clear + from, l->clear, 4 * (size_t)some);
+    }
+}
+// Where n lines from points (3, n) all the way (3, n) meet the surfaces of objects alone, by their numbers: lines and how far
+// along, from 0 to 1, as many as there is room for; their number. Steps are as long as the distance, which changes at rates
+// (n) at most, and at least so small a part (n) of a line.
+int64_t NAME(crossings)(const Scene *s, int64_t n, const int32_t *object, const float *p, const float *way, const float *rate,
+                        const float *least, int64_t room, int32_t *line, float *along) {
+    int64_t count = 0;
+    for (int64_t i = 0, end; i < n; i = end) {
+        const Object *o = s->object + object[i];
+        for (end = i; end < n && end < i + W && object[end] == object[i];) end++;
+        V from, to, local;
+        F slowest, part, t = all(0);
+        M alive;
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < end ? i + k : end - 1;
+            from.x[k] = p[j]; from.y[k] = p[n + j]; from.z[k] = p[2 * n + j];
+            to.x[k] = way[j]; to.y[k] = way[n + j]; to.z[k] = way[2 * n + j];
+            slowest[k] = 1 / rate[j]; part[k] = fmaxf(least[j], 1e-4f); alive[k] = i + k < end ? -1 : 0;
+        }
+        from = mapped(o->map, from); to = times(o->map, to);
+        F d = leaf_distance(s, o, from, 1, &local);
+        while (any(alive)) {
+            F step = max2(size_of(d) * slowest, part), past = leaf_distance(s, o, plus(from, scaled(to, t + step)), 1, &local);
+            for (int m = bits(alive & ((past < 0.0f) ^ (d < 0.0f))); m; m &= m - 1) {
+                int k = __builtin_ctz((unsigned)m);
+                if (count < room) { line[count] = (int32_t)(i + k); along[count] = t[k] + step[k] * d[k] / (d[k] - past[k]); }
+                count++;
+            }
+            t += step; d = past;
+            alive &= t < 1.0f;
+        }
+    }
+    return count;
+}
+// Light (3, n) of a lamp of power 1 and a radius that rough mirrors at n points with unit normals send back if nothing is in
+// its way; of roughness (n), unit ways back (3, n) and what they reflect along the normal (3, n).
+void NAME(mirrored)(int64_t n, const float *at, float radius, const float *p, const float *normal, const float *rough,
+                    const float *back, const float *straight, float *light) {
+    V lamp = {all(at[0]), all(at[1]), all(at[2])};
+    for (int64_t i = 0; i < n; i += W) {
+        V q, up, to, part;
+        F uneven;
+        read_points(p, n, i, &q); read_points(normal, n, i, &up); read_points(back, n, i, &to); read_points(straight, n, i, &part);
+        for (int k = 0; k < W; k++) uneven[k] = rough[i + k < n ? i + k : n - 1];
+        V r = mirrored(lamp, radius, q, up, uneven, to, part);
+        store(light, n, i, r.x); store(light + n, n, i, r.y); store(light + 2 * n, n, i, r.z);
+    }
+}
+// What n nodes receive (n, 3) where nodes send (nodes, 3), by the parts of these that they see.
+void NAME(exchanged)(int64_t n, const int64_t *begin, const int32_t *index, const float *share, const float *sent, float *received) {
+    for (int64_t j = 0; j < n; j++) {
+        float sum[3] = {0, 0, 0};
+        for (int64_t k = begin[j]; k < begin[j + 1]; k++) for (int d = 0; d < 3; d++) sum[d] += share[k] * sent[3 * index[k] + d];
+        for (int d = 0; d < 3; d++) received[3 * j + d] = sum[d];
+    }
 }

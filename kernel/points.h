@@ -5,12 +5,6 @@
 
 typedef struct { V at; M in; const Object *object; int far; } Near;  // an object that points of a packet may meet
 
-IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
-    for (int k = 0; k < W; k++) {
-        int64_t j = at + k < n ? at + k : n - 1;
-        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
-    }
-}
 // Objects, as numbers that rise, that points of packets from `from` on may meet within their reach.
 static int listed(const Scene *s, const float *p, const float *reach, int64_t n, int64_t from, int32_t *list) {
     V low = {all(BIG), all(BIG), all(BIG)}, high = {all(-BIG), all(-BIG), all(-BIG)};

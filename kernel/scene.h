@@ -64,3 +64,16 @@ typedef struct {
     const Lamp *lamp;
     const Scene *opaque, *hazy;  // what is opaque alone, and what is not, as lamps of a radius ask
 } Stage;
+typedef struct { float p[3], n[3], sent[3], colour[3], weight; } Node;  // of the light
+typedef struct {  // light from everywhere, as scenelang/drawing/solid/around.py makes it
+    float low[3], side;  // of cells, which know `near` nodes each for the six ways that they face
+    float horizon[3], zenith[3], floor, fade;
+    float scale, warp;  // of the nodes of the ground, `ground` along both axes from `first` on
+    float corner[3], spacing;  // of the lattice of media, of `sides` nodes
+    int32_t nodes, first, near, counts[3], ground, grounded, hollow, lamps, sides[3], steps, discs;
+    const Node *node;
+    const int32_t *index;  // nodes of cells, and for hollows whether no wall is between each and the first
+    const uint8_t *alike;
+    const float *about;  // places, normals and weights (7, 16) of the nodes of cells
+    const float *lamp, *haze, *disc;  // places, powers and radii; light and density; places, normals, light and areas
+} Around;

@@ -151,14 +151,15 @@ static int narrowed(const Scene *s, const float at[3], const Rows *way, int n, f
     if (cosine > -0.5f) cosine = cosine * sqrtf(1 - more * more) - sqrtf(fmaxf(1 - cosine * cosine, 0)) * more;
     return in_cone(s, at, axis, cosine, list);
 }
-// The light that surfaces receive of a lamp of power 1, by the cosines at which they see its middle and their distances
-// from that (Snyder, Area Light Sources for Real-Time Graphics, 1996).
+// What surfaces receive of a lamp of a radius and power 1 that nothing hides, by the cosine at which they see its middle
+// and how far that is; 0 within it (Snyder, Area Light Sources for Real-Time Graphics, 1996).
 IN F form(F cosine, F far, float radius) {
+    if (!(radius > 0)) return max2(cosine, all(0)) / (far * far);
     F h = max2(far / radius, all(1)), x = root(h * h - 1.0f), sine = root(max2(1.0f - cosine * cosine, all(1e-12f)));
     F y = clamp(-x * cosine / sine, -1, 1), edge = sine * root(1.0f - y * y), slope = edge / max2(x, all(1e-6f));
-    F low = ((cosine * arc(y) - x * edge) / (h * h) + arc(1.0f / root(1.0f + slope * slope))) * 0.318309886f;
-    F r = sel(cosine * h >= 1.0f, cosine / (h * h), low) / (radius * radius);
-    return sel((cosine * h > -1.0f) & (far > radius), max2(r, all(0)), all(0));
+    F low = (cosine * arc(y) - x * edge) / (h * h) + arc(1.0f / root(1.0f + slope * slope));
+    F result = sel(cosine * h >= 1.0f, cosine / (h * h), low * 0.318309886f) / (radius * radius);
+    return sel((cosine * h > -1.0f) & (far > radius), max2(result, all(0)), all(0));
 }
 // The part of light that media let through from a point of a lamp, off its middle, to points.
 static ONCE F through(Job *j, const Lamp *lamp, const float beam[3], V p, M some) {
@@ -244,10 +245,7 @@ static void light_up(Job *j, Beam *b, int n, int media) {
             if (media) {
                 F rim = radius > 0 ? root(max2(1.0f - (radius / r) * (radius / r), all(0))) : all(1);
                 received = sel(radius > 0 ? r > radius : ints(-1), 1.0f / (2.0f * r * r * (1.0f + rim)), all(0));
-            } else {
-                F facing = -dot(normal, to) / r;
-                received = radius > 0 ? form(facing, r, radius) : facing / (r * r);
-            }
+            } else received = form(-dot(normal, to) / r, r, radius);
             to = plus(to, scaled(normal, all(stage->lift)));
             F far = root(dot(to, to)), bright = all(0);
             to = scaled(to, 1.0f / max2(far, all(1e-9f)));

@@ -98,3 +98,13 @@ IN F logarithm(F x) {  // of normal x > 0, within 1e-7 of itself or of 1: Cephes
     F k = floats(e);
     return m + (y * m * z - 2.12194440e-4f * k - 0.5f * z) + 0.693359375f * k;
 }
+IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
+    for (int k = 0; k < W; k++) {
+        int64_t j = at + k < n ? at + k : n - 1;
+        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
+    }
+}
+IN void store(float *to, int64_t n, int64_t at, F values) {
+    if (at + W <= n) memcpy(to + at, &values, sizeof values);
+    else memcpy(to + at, &values, 4 * (size_t)(n - at));
+}

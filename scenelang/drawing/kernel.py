@@ -21,9 +21,11 @@ import numpy.typing as npt
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.how import RenderError, check_time
 from scenelang.drawing.tables import (
+    AROUND,
     CELL,
     DECODER,
     LAMP,
+    NODE,
     OBJECT,
     PIECE,
     SCENE,
@@ -36,13 +38,20 @@ from scenelang.drawing.tables import (
 
 FOLDER: Final = Path(__file__).resolve().parent
 ROOT: Final = FOLDER.parents[1]  # of a checkout
-_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE)
+_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE, NODE, AROUND)
 _SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
-    **{"cones": ("iplpfppppppp", ""), "shade": ("ippiiiippp", "")},
-    "finish": ("ippiiiippppp", ""),
+    **{"cones": ("iplpfppppppp", ""), "shade": ("ippiiiippp", ""), "finish": ("ippiiiippppp", "")},
+    **{
+        "around": ("ipplpppiippppppp", ""),
+        "exchanged": ("ilppppp", ""),
+        "arriving": ("ipplppippp", ""),
+        "glowing": ("ipplppfpppplp", "l"),
+    },
+    **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"mirrored": ("ilpfpppppp", "")},
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -68,6 +77,14 @@ class Asked(NamedTuple):
     register: Array  # (R, M) as `Looks`
     owner: Array  # (M,) numbers of objects whose material holds, from 1; 0 for none
     met: int  # pairs of points and objects that met
+
+
+class Exchange(NamedTuple):
+    """Parts of nodes that M nodes see."""
+
+    begin: npt.NDArray[np.int64]  # (M + 1,) where those that each sees begin
+    node: npt.NDArray[np.int32]  # (k,) which these are
+    share: Floats  # (k,)
 
 
 class Trails(NamedTuple):
@@ -156,6 +173,31 @@ class Kernel:
         given = numbers.ctypes.data, points.ctypes.data, None, None, result.ctypes.data
         self._library.own(self.variant, tables.scene.ctypes.data, count, *given)
         return result
+
+    def crossings(
+        self,
+        tables: Tables,
+        objects: npt.NDArray[np.integer],
+        begin: Floats,
+        way: Floats,
+        *parts: npt.NDArray[Any],
+    ) -> tuple[npt.NDArray[np.int32], Floats]:
+        """Lines (k,), of those that begin at (3, M) and go all the way (3, M), that meet the surfaces of
+        objects alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long
+        as the distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
+        """
+        numbers = np.ascontiguousarray(objects, np.int32)
+        given = [np.ascontiguousarray(part, np.float32) for part in (begin, way, *parts)]
+        count, room = len(numbers), 4 * len(numbers)
+        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
+        while True:
+            line, along = np.empty(room, np.int32), np.empty(room, np.float32)
+            places = [part.ctypes.data for part in (numbers, *given)]
+            rest = room, line.ctypes.data, along.ctypes.data
+            found = self._library.crossings(self.variant, tables.scene.ctypes.data, count, *places, *rest)
+            if found <= room:
+                return line[:found], along[:found]
+            room = found
 
     def rays(
         self,
@@ -277,15 +319,152 @@ class Kernel:
                 counts[1] += counts[0]
         return result, tuple(counts[1].tolist())
 
+    def around(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        n: Floats,
+        turns: Floats,
+        rays: int,
+        *,
+        finer: bool = False,
+        parts: Exchange | None = None,
+        until_s: float = NEVER,
+    ) -> tuple[Floats, int, int]:
+        """Light that points (3, M) with unit normals (3, M) receive by so many rays, by the tables of an
+        `AROUND` row, and how far halves of these are from it (6, M). Turns (2, M) tell points apart. If
+        ``finer``, some rays send others where they end. All of these, and pairs of points and objects, are
+        counted.
+
+        With ``parts`` those of nodes that are seen are written there, and the result is what comes from
+        elsewhere, then the part of rays that meet objects.
+        """
+        row, counts = np.zeros(int(around["nodes"]), np.float32), np.zeros((2, 2), np.int64)
+        scene, result = tables.scene.ctypes.data, np.empty((6, p.shape[1]), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        for some in _portions(tables, p.shape[1], until_s, rays):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, n, turns)]
+            light = np.empty((6, given[0].shape[1]), np.float32)
+            into: list[Any] = [None] * 4
+            if parts is not None:
+                into = [part.ctypes.data for part in (parts.begin[some.start :], *parts[1:], row)]
+            start = scene, around.ctypes.data, light.shape[1], *(part.ctypes.data for part in given)
+            rest = rays, finer, light.ctypes.data, *into, counts[0].ctypes.data, scratch.ctypes.data
+            self._library.around(self.variant, *start, *rest)
+            result[:, some] = light
+            counts[1] += counts[0]
+        asked, met = counts[1].tolist()
+        return result, asked, met
+
+    def exchanged(self, parts: Exchange, sent: Floats) -> Floats:
+        """What nodes receive (3, M) where they send (3, M)."""
+        sent = np.ascontiguousarray(sent.T, np.float32)
+        result = np.empty_like(sent)
+        places = [part.ctypes.data for part in (*parts, sent, result)]
+        self._library.exchanged(self.variant, len(sent), *places)
+        return result.T
+
+    def arriving(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        way: Floats,
+        finer: bool = False,
+        until_s: float = NEVER,
+    ) -> tuple[Floats, Floats]:
+        """Light (3, M) that comes to points (3, M) from unit directions (3, M), without media, and from how
+        far; the rest as of `around`.
+        """
+        scene, count = tables.scene.ctypes.data, p.shape[1]
+        light, reach = np.empty((3, count), np.float32), np.empty(count, np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        for some in _portions(tables, count, until_s):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, way)]
+            part, far = np.empty_like(given[0]), reach[some]
+            start = scene, around.ctypes.data, len(far), *(part.ctypes.data for part in given)
+            rest = finer, part.ctypes.data, far.ctypes.data, scratch.ctypes.data
+            self._library.arriving(self.variant, *start, *rest)
+            light[:, some] = part
+        return light, reach
+
+    def haze(
+        self, tables: Tables, around: Rows, p: Floats, way: Floats, reach: Floats
+    ) -> tuple[Floats, Floats]:
+        """Light (3, M) of media along rays from points (3, M) in unit directions (3, M) from as far as a
+        reach (M,), by the tables of an `AROUND` row, and the part (M,) that they let through.
+        """
+        given = [np.ascontiguousarray(part, np.float32) for part in (p, way, reach)]
+        scene, clear = tables.scene.ctypes.data, np.empty_like(given[2])
+        light = np.empty((3, len(clear)), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        places = [part.ctypes.data for part in (*given, light, clear, scratch)]
+        self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
+        return light, clear
+
+    def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
+        """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M)
+        with unit normals (3, M) send back if nothing is in its way; coats (4 + R, M) have their roughness,
+        unit ways back, and what they reflect along the normal, in threes.
+        """
+        at, p, n, coat = (np.ascontiguousarray(part, np.float32) for part in (at, p, n, coat))
+        result = np.empty_like(coat[4:])
+        for row in range(0, len(result), 3):
+            parts = (p, n, coat, coat[1:4], coat[4 + row :], result[row:])
+            places = [part.ctypes.data for part in parts]
+            self._library.mirrored(self.variant, p.shape[1], at.ctypes.data, radius, *places)
+        return result
+
+    def glowing(
+        self,
+        tables: Tables,
+        around: Rows,
+        p: Floats,
+        n: Floats | None,
+        worth: float,
+        *,
+        parts: bool = True,
+        drawn: int = 0,
+        until_s: float = NEVER,
+    ) -> tuple[Floats, Floats, npt.NDArray[np.int32], Floats]:
+        """Light (3, M) of discs at points (3, M) with unit normals (3, M), or surfaces that face each disc,
+        if nothing hides it, and the parts (3, M) that arrive, if asked, by fewer rays where less is received
+        than ``worth``. Of so many of these rays from each point numbers (k,) of points, and unit ways and
+        light that arrives (6, k).
+        """
+        scene, count = tables.scene.ctypes.data, p.shape[1]
+        light, free = np.empty((3, count), np.float32), np.ones((3, count), np.float32)
+        scratch = np.empty(self._library.scratch(self.variant, scene), np.uint8)
+        numbers, rays = [np.empty(0, np.int32)], [np.empty((6, 0), np.float32)]
+        for some in _portions(tables, count, until_s, 32):
+            given = [np.ascontiguousarray(part[:, some], np.float32) for part in (p, n) if part is not None]
+            size = given[0].shape[1]
+            sent, clear = np.empty((3, size), np.float32), np.empty((3, size), np.float32)
+            point, ray = np.empty(drawn * size, np.int32), np.empty((6, drawn * size), np.float32)
+            start = scene, around.ctypes.data, size, given[0].ctypes.data
+            facing = given[1].ctypes.data if n is not None else None
+            into = sent.ctypes.data, clear.ctypes.data if parts else None
+            rest = point.ctypes.data, ray.ctypes.data, drawn * size, scratch.ctypes.data
+            found = self._library.glowing(self.variant, *start, facing, worth, *into, *rest)
+            light[:, some] = sent
+            if parts:
+                free[:, some] = clear
+            numbers.append(point[:found] + np.int32(some.start))
+            rays.append(ray[:, :found])
+        return light, free, np.concatenate(numbers), np.concatenate(rays, 1)
+
 
 def _portion(tables: Tables) -> int:
     """Rays, at least one, between which the time is checked."""
     return max(PORTION * MANY // max(int(tables.scene["objects"]), MANY), PORTION >> 6)
 
 
-def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:
-    """Parts of so many rays, at least one; raises `RenderError` as `check_time` does before each."""
-    size = _portion(tables)
+def _portions(tables: Tables, count: int, until_s: float, each: int = 1) -> Iterator[slice]:
+    """Parts of so many points with rays of ``each``, at least one; raises `RenderError` as `check_time` does
+    before each.
+    """
+    size = max(_portion(tables) // each, 16)
     for begin in range(0, max(count, 1), size):
         check_time(until_s)
         yield slice(begin, min(begin + size, count))

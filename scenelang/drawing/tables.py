@@ -81,6 +81,12 @@ STAGE = _dtype(
     "i4 lamps grounded transparent glow width height count every nodes",
     "u8 lamp opaque hazy",
 )
+NODE = _dtype("f4 p[3] n[3] sent[3] colour[3] weight")
+AROUND = _dtype(
+    "f4 low[3] side horizon[3] zenith[3] floor fade scale warp corner[3] spacing",
+    "i4 nodes first near counts[3] ground grounded hollow lamps sides[3] steps discs",
+    "u8 node index alike about lamp haze disc",
+)
 
 SLACK = 0.002  # leaf units by which a learned surface may leave the unit ball
 LOOSE = 0.03  # the same, per leaf unit, of one that grows

@@ -15,11 +15,11 @@ import numpy as np
 
 from scenelang.compiler.program import Program
 from scenelang.compiler.spaces import Sky
-from scenelang.drawing.solid.around import BATCH, GOLDEN, TURNS, Around, arriving, disc
+from scenelang.drawing.solid.around import GOLDEN, TURNS, Around, arriving, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import MARCH_SETTINGS
-from scenelang.drawing.solid.mist import AROUND, Floats, box_of, pair_of
+from scenelang.drawing.solid.mist import NEIGHBOURS, Floats, box_of, pair_of
 from scenelang.drawing.solid.network import SolidArrays
 from scenelang.web.arrays import ArrayStore
 
@@ -28,6 +28,7 @@ NOISE = 0.02  # of the light, above which there are more rays
 UNLIKE = 0.15  # of the light of both, by which neighbours differ that are not mixed
 FILLED = 3  # nodes in solids that a surface may be next to, behind each other
 OFF, GAP = 1e-3, 0.01  # world units off the ground where rays begin, and as of `MarchSettings`
+BATCH = 1 << 16  # points at once
 PAIRS: Final = ((0, 1), (1, 2), (2, 0), (0, 0), (1, 1))
 
 
@@ -158,8 +159,7 @@ def _glowing(around: Around, p: Floats, counts: Counts) -> Floats:
     result = np.zeros((len(counts(p)), 3, p.shape[1]), np.float32)
     for start in range(0, p.shape[1] if around.emitters.there else 0, BATCH):
         band = slice(start, start + BATCH)
-        _, point, way, light, clear = around.emitters.seen(p[:, band], None, 0.0)
-        light = light * clear
+        point, way, light = around.drawn(p[:, band])
         for row, count in zip(result, counts(way), strict=True):
             around.xp.add(row[:, band], point, light * count / 4)
     return result.reshape(-1, p.shape[1])
@@ -168,7 +168,7 @@ def _glowing(around: Around, p: Floats, counts: Counts) -> Floats:
 def _evened(values: np.ndarray, free: np.ndarray) -> Floats:
     """Values (…, n…) mixed with those of free neighbours that are as bright, 0 where there are none."""
     total, count, bright = 8 * values * free, 8.0 * free, values[:3].sum(0) * free
-    for shift in AROUND:
+    for shift in NEIGHBOURS:
         to, on = pair_of(free.shape, shift)
         apart = (bright[on] - bright[to]) / (UNLIKE * (bright[on] + bright[to])).clip(1e-9)
         weight = 2 ** (3 - sum(map(abs, shift))) * free[on] / (1 + free[to] * apart**4)

@@ -35,7 +35,7 @@ def discs(count: int) -> str:
 def counted(drawn: Program, monkeypatch: pytest.MonkeyPatch) -> float:
     """How often the network is asked while a picture is drawn, and some of that for each ray."""
     count = 0.0
-    field, rays = Kernel.field, Kernel.rays
+    field, rays, gathered = Kernel.field, Kernel.rays, Kernel.around
 
     def met(self: Kernel, *given: Any, **named: Any) -> Any:
         nonlocal count
@@ -49,7 +49,14 @@ def counted(drawn: Program, monkeypatch: pytest.MonkeyPatch) -> float:
         count += result.met + around.EACH_RAY * len(result.hit)
         return result
 
+    def received(self: Kernel, *given: Any, **named: Any) -> Any:
+        nonlocal count
+        light, asked, pairs = gathered(self, *given, **named)
+        count += pairs + around.EACH_RAY * asked
+        return light, asked, pairs
+
     with monkeypatch.context() as patch:
+        patch.setattr(Kernel, "around", received)
         patch.setattr(Kernel, "field", met)
         patch.setattr(Kernel, "rays", followed)
         draw_small(drawn, patient=True)

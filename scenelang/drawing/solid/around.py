@@ -2,6 +2,7 @@
 
 1. *Nodes* (`nodes.py`) on objects and ground are lit by lamps. Rays from each, the same in every picture,
    find what it sees; what nodes send to nodes is a matrix, and its fixed point has all bounces (radiosity).
+   The kernel (`light.h`) sends rays, looks up nodes around their ends, and sums what comes.
 2. From the points of a lattice on the picture rays go all over the hemisphere (final gathering). Nodes around
    where they end say what comes from there.
 3. Points of the lattice share what they receive with those around on the same surface. Pixels between take
@@ -12,15 +13,16 @@ Letters: J nodes, K points, L points of the lattice, R rays.
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable
 from copy import copy
 from math import ceil, isqrt
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from scenelang.compiler.spaces import LIFT, Ground, Sky, Stage
+from scenelang.compiler.spaces import Ground, Sky, Stage
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
+from scenelang.drawing.kernel import Exchange, load_kernel
 from scenelang.drawing.solid.centres import UNKNOWN
 from scenelang.drawing.solid.emitters import Emitters
 from scenelang.drawing.solid.field import SolidField
@@ -28,49 +30,43 @@ from scenelang.drawing.solid.march import INF
 from scenelang.drawing.solid.mist import Mist
 from scenelang.drawing.solid.nodes import (
     ALL,
+    FAR,
     HOLLOW,
     LEAST,
     NODES,
     SCATTER,
     SIDES,
+    WARP,
     Nodes,
-    ground_places,
     on_ground,
     on_objects,
     sphere,
     spread,
-    turned,
 )
+from scenelang.drawing.tables import AROUND, NODE
 
-RAYS = (8, 8), (64, 64)  # of nodes on objects and of the ground, and where something may be hollow
-# light by which nodes around a place differ, and world units from a place, for which that sends so many rays
-DIFFER, SHORT, AGAIN = 0.3, 1.2, 5
+RAYS = 8, 64  # of nodes, and where something may be hollow
 GAP = 0.01  # world units, as of `MarchSettings`
 CAP = 0.98  # of colours
 ROUNDS, KEPT = 100, 8  # of the solver at most, and earlier directions that each is made to differ from
 EXACT = 1e-3  # the part of the light that bounces leave out at most
 NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearby
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
-ASIDE = 60.0  # times as far, squared, as along a surface are nodes off whose plane a place lies
 GOLDEN = 2.399963  # radians
 CLOSED = 0.1  # of nodes on objects, more of which see nothing but objects in what is closed
-LITTLE = 0.02  # share of a node that is worth the asking
-OPEN = 0.02  # of the shares of nodes around a place, that no wall hides; less is dark
 # so far before surfaces, in world units, parts of a way, and at most, ways begin and end that walls may cross
 APART, RISE, HIGHEST = 0.02, 0.3, 0.1
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
 LATTICE = (52, 12), (96, 16), (96, 32)
 POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
-WAY = 0.3  # of a ray's, beside the normal, which nodes around its end face against
 WORTH = 0.5  # of the mean light on the lattice, for which points ask what glows with all their rays
-OFF, AHEAD = 1e-3, 3e-4  # world units off a surface, and on their way, where these begin
+OFF = 1e-3  # world units off a surface where rays begin
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
-SHUT = 1e-2  # world units: light of rays that end so near fades, as those begin within what is opaque
+DRAWN = 32  # rays at most from a point to what glows
 EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, in hollows; above it rays are sent again, so often, far above more, turned so
 NOISE, MORE, FURTHER = (0.035, 0.025), (3, 7), np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
-BATCH = 1 << 16  # rays at once
 LEVEL = 0.1  # of squares of steps: planes through few points are as level
 THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
 ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
@@ -79,7 +75,7 @@ PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
 # rays sent for each that gathers light, and where walls may hide nodes; from each pixel that mirrors; media;
 # the share of rays of the ground that meet media
-PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 7.0, (1.0, 1.5), 10, 2e6, 0.2
+PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 2.0, (1.0, 1.5), 10, 2e6, 0.2
 CELLS = 8  # of the grid of nodes, along its longest side
 
 
@@ -124,36 +120,13 @@ class Lookup:
             along = facing[..., axis] * (2 * sign - 1)
             chosen = np.argpartition(off + AWAY * (along > -TURNED), count - 1, 1)[:, :count]
             found.append(np.take_along_axis(close, chosen, 1))
-        self.index = xp.array(np.concatenate(found).astype(np.int64), nodes.p)  # (6 cells, k)
-        self.alike: Any = None  # whether no wall is between nodes and the first of their cell (6 cells, k)
-        # what places ask, cell by cell: positions, normals and weights of its nodes (cells, 7, k)
-        about = xp.take(xp.concat([nodes.p, nodes.n, nodes.weight[None]], 0), self.index.reshape(-1))
-        self.about = xp.packed(about.reshape(len(about), *self.index.shape).swapaxes(0, 1))
-        self.room = float(self.side / 4) ** 2  # the square of how near is near
-
-    def near(self, p: Array, way: Array) -> tuple[Array, Array]:
-        """Cells (K,) of points (3, K), and shares (K, k) of the nodes near them that face against unit
-        directions and in whose planes they lie.
-        """
-        xp, size = self.xp, abs(way)
-        first, second = size[0] >= xp.maximum(size[1], size[2]), size[1] >= size[2]
-        along = xp.select(first, way[0], xp.select(second, way[1], way[2]))
-        cell = xp.whole(~first) * xp.whole(4 - 2 * second) + xp.whole(along > 0)
-        for axis, count in enumerate(self.counts.tolist()):
-            at = (p[axis] - float(self.low[axis])) / self.side
-            cell = cell * count + self.xp.whole(at.clip(0, count - 1))
-        about = self.about[cell]
-        facing: Any = 0.0
-        above: Any = 0.0
-        square = self.room
-        for axis in range(3):
-            off, normal = about[:, axis] - p[axis][:, None], about[:, 3 + axis]
-            square = square + off * off
-            above = above + off * normal
-            facing = facing - normal * way[axis][:, None]
-        square = square + ASIDE * (above * above)
-        shares = about[:, 6] * (facing.clip(0.0) ** 2 + 1e-5) / (square * square)
-        return cell, shares / shares.sum(1).clip(1e-20)[:, None]
+        self.index = np.concatenate(found, dtype=np.int32)  # (6 cells, k)
+        # whether no wall is between nodes and the first of their cell (6 cells, k)
+        self.alike = np.zeros(self.index.shape, np.uint8)
+        # positions, normals and weights of a cell's nodes, in whole packets (6 cells, 7, 16)
+        self.about = np.zeros((len(self.index), 7, 16), np.float32)
+        rows = np.concatenate([nodes.p, nodes.n, nodes.weight[None]])[:, self.index]
+        self.about[:, :, : self.index.shape[1]] = rows.swapaxes(0, 1)
 
 
 class Seen(NamedTuple):
@@ -194,7 +167,7 @@ class Around:
         """Place the nodes, and find what they see."""
         xp, field, stage = self.xp, self.field, self.stage
         own, floor = on_objects(field, stage, self.hollow), on_ground(field, stage, self.hollow)
-        self.emitters = Emitters(field, own)
+        self.emitters = Emitters(own)
         kept = xp.where(own.place[4] > 0)
         own = Nodes(*(xp.take(part, kept) for part in own))
         self.first = own.p.shape[1]  # node of the ground
@@ -204,10 +177,47 @@ class Around:
         self.finer = self.hollow and not self.emitters.there
         if self.hollow and self.lookup is not None:
             index = self.lookup.index
-            first = xp.concat([index[:, :1]] * index.shape[1], 1).reshape(-1)
-            free = self._open(xp.take(own.p, first), xp.take(own.n, first), index.reshape(-1))
-            self.lookup.alike = free.reshape(index.shape) > 0
+            first = np.broadcast_to(index[:, :1], index.shape).reshape(-1)
+            free = self._open(own.p[:, first], own.n[:, first], index.reshape(-1))
+            self.lookup.alike[:] = free.reshape(index.shape)
+        self._tell(0 * self.nodes.p)
         self.exchange = self._exchange(RAYS[self.hollow])
+
+    def _tell(self, sent: Array) -> None:
+        """Make the tables of the kernel's `Around`, of what nodes send (3, J)."""
+        nodes, lookup, ground, emitters = self.nodes, self.lookup, self.stage.ground, self.emitters
+        row, own = np.zeros((), AROUND), np.zeros(self.count, NODE)
+        for name, part in (("p", nodes.p), ("n", nodes.n), ("sent", sent), ("colour", nodes.colour)):
+            own[name] = part.T
+        own["weight"] = nodes.weight
+        lamps = [
+            [*lamp.position, *(lamp.power * np.array(lamp.rgb)), lamp.radius] for lamp in self.stage.lights
+        ]
+        tables = {"node": own, "lamp": np.array(lamps, np.float32), "disc": emitters.discs}
+        values = {
+            "horizon": self.horizon[:, 0],
+            "zenith": self.zenith[:, 0],
+            "fade": (ground or Ground()).fade ** 2,
+            "nodes": self.count,
+        }
+        values |= {
+            "first": self.first,
+            "lamps": len(lamps),
+            "discs": len(emitters.discs),
+            "hollow": self.hollow,
+        }
+        if lookup is not None:
+            tables |= {"index": lookup.index, "alike": lookup.alike, "about": lookup.about}
+            values |= {"low": lookup.low, "side": lookup.side, "counts": lookup.counts}
+            values["near"] = lookup.index.shape[1]
+        if ground is not None:
+            values |= {"grounded": 1, "floor": ground.y, "ground": isqrt(self.count - self.first)}
+            values |= {"scale": np.sinh(WARP) / FAR, "warp": WARP}
+        for name, value in (values | {name: table.ctypes.data for name, table in tables.items()}).items():
+            row[name] = value
+        if self.mist is not None:
+            self.mist.tell(row)
+        self.row, self.tables = row, tables  # the row points to these
 
     def light(self, lamps: Callable[[Array, Array], Array]) -> None:
         """Find what nodes send and receive under lamps."""
@@ -215,7 +225,7 @@ class Around:
         with self.xp.inference():
             direct = lamps(n.p, n.n) + self._glowing(n.p, n.n)
             received = self._solved(direct)
-            self.sent = n.colour.clip(0.0, CAP) * (direct + received)  # (3, J), without what glows
+            self._tell(n.colour.clip(0.0, CAP) * (direct + received))  # without what glows
         if self.mist is not None:
             self.mist.relight(self._floored)
             self.medium = self.mist.medium
@@ -251,7 +261,7 @@ class Around:
 
             light, self.seen, self.rings = received(0), Seen(p, n, p), dict[int, tuple[Array, ...]]()
             self.worth = WORTH * float(light[:3].sum()) / max(len(there), 1)
-            glow, free = self.emitters.received(at, up, self.worth)
+            glow, free = self.glow(at, up, self.worth)
             whole = float(light[:3].sum()) + float((glow * free).sum())
             over = (float(abs(self._evened(light[3:])).sum()) / max(NOISE[self.finer] * whole, 1e-9)) ** 2
             light, more = light[:3], min(max(over - 1, 0.0), max(MORE[0], over / MORE[0]), MORE[1])
@@ -269,80 +279,22 @@ class Around:
         shape = (3,) + (1,) * (way.ndim - 1)
         return self.horizon.reshape(shape) + (self.zenith - self.horizon).reshape(shape) * high
 
-    def _exchange(self, rays: tuple[int, int]) -> tuple[Array, Array]:
-        """Parts of each node that nodes see (J, J) by rays, so many on objects and on the ground, and what
-        they receive of the sky, the horizon and media (3, J).
+    def _exchange(self, rays: int) -> tuple[Exchange, Array]:
+        """Parts of nodes that nodes see by so many rays, and what they receive of the sky, the horizon and
+        media (3, J).
         """
-        xp, nodes, count = self.xp, self.nodes, self.count
-        row, escaped = xp.full((1, count * count), 0.0, nodes.p), xp.full((3, count), 0.0, nodes.p)
-        found: list[tuple[Array, Array]] = []  # places in the row, and shares
-        each = np.repeat(rays, (self.first, count - self.first))
-        owner, among = np.repeat(np.arange(count), each), np.repeat(each, each)
-        number = np.arange(len(owner)) - np.repeat(np.cumsum(each) - each, each)
-        turns = 2 * np.pi * (SCATTER @ np.asarray(xp.to_numpy(nodes.place[:3]), np.float64) % 1.0)
-        r, angle = np.sqrt((number + 0.5) / among), GOLDEN * number + turns[owner]
-        node, share = xp.array(owner, nodes.p), xp.array((1 / among).astype(np.float32), nodes.p)
-        way = turned(xp, xp.take(nodes.n, node), xp.array(disc(r, angle).astype(np.float32), nodes.p))
-        p = xp.take(nodes.p + LIFT * nodes.n, node)
-        limit = to_ground(xp, self.stage.ground, p[1], way)
-        bands = [slice(at, at + BATCH) for at in range(0, max(1, len(limit)), BATCH)]
-        hits = [
-            self.field.march(p[:, band], way[:, band], limit[band], halvings=0, gap=GAP, whole=True).hit
-            for band in bands
-        ]
-        hit, through = xp.concat(hits, 0), share
-        if self.mist is not None:
-            light, clear = self.mist.along(p, way, xp.minimum(hit, limit))
-            xp.add(escaped, node, light * share)
-            through = share * clear
-        within, weight = hit[: self.first * rays[0]] < INF, nodes.weight[: self.first]
-        within = weight * (within.reshape(-1, rays[0]).sum(1) == rays[0])
+        nodes, near = self.nodes, max(int(self.row["near"]), 4)
+        turn = SCATTER @ nodes.place[:3].astype(np.float64) % 1.0
+        most = self.count * rays * near
+        parts = Exchange(
+            np.zeros(self.count + 1, np.int64), np.empty(most, np.int32), np.empty(most, np.float32)
+        )
+        found = self._received(nodes.p, nodes.n, np.stack([0 * turn + 0.5, turn]), rays, parts=parts)
+        weight = nodes.weight[: self.first]
+        within = weight * (found[3, : self.first] > 1 - 0.5 / rays)
         self.closed = float(within.sum()) / max(float(weight.sum()), 1e-9)
-        for some, _, index, shares, kept, _ in self._ends(p, way, hit, limit):
-            place, part = xp.take(node, some) * count + index, xp.take(through, some)
-            found.append((place.reshape(-1), (shares * (kept * part)).reshape(-1)))
-            xp.add(escaped, xp.take(node, some), self.horizon * ((1 - kept) * part))
-        if found:
-            place, shares = (xp.concat(parts, 0) for parts in zip(*found, strict=True))
-            xp.add(row, place, shares[None])
-        seen = xp.where((hit == INF) & (limit == INF))
-        xp.add(escaped, xp.take(node, seen), self.sky(xp.take(way, seen)) * xp.take(through, seen))
-        return row.reshape(count, count), escaped
-
-    def _ends(self, p: Array, way: Array, hit: Array, limit: Array) -> Iterator[tuple[Array, ...]]:
-        """Rays (k,) from points (3, K) that end on objects, then those on the ground: their indices, ends
-        (3, k), and what `_around` and `_on_floor` tell of these.
-        """
-        xp = self.xp
-        for on_floor, met in enumerate((hit < INF, (hit == INF) & (limit < INF))):
-            some = xp.where(met)
-            if len(some) and (on_floor or self.lookup):
-                ways = xp.take(way, some)
-                at = xp.take(p, some) + ways * xp.take(xp.minimum(hit, limit), some)
-                yield some, at, *(self._on_floor(at) if on_floor else self._around(at, ways))
-
-    def _around(self, at: Array, way: Array) -> tuple[Array, ...]:
-        """Nodes (j, K) around points (3, K) where rays end, their shares, as of `Lookup`, 1, and normals."""
-        xp = self.xp
-        g = self.field.near(at, 0 * at[0] + GAP, gradient=True).gradient
-        # in a crevice the nearest surface may be the one that is left
-        g = xp.select((g * way).sum(0) > 0, way, g * (-1 / xp.length(list(g)).clip(1e-9)))
-        way = WAY * way + g
-        lookup: Lookup = self.lookup
-        cell, shares = lookup.near(at, way / xp.length(list(way)).clip(1e-9))
-        if self.hollow:  # of a cell's nodes with no wall between them, one tells of all
-            alike, shown = lookup.alike[cell], 0 * shares
-            groups = alike, ~alike
-            for group in groups:
-                part = shares * group
-                shown = shown + (part > LITTLE) * (part >= xp.largest(part.T).T)
-            large = xp.where(shown.reshape(-1) > 0)
-            nodes, place = xp.take(lookup.index[cell].reshape(-1), large), large // shares.shape[1]
-            shown = 0 * shares
-            shown.reshape(-1)[large] = self._open(xp.take(at, place), xp.take(-g, place), nodes)
-            shares = shares * sum(group * xp.largest((shown * group).T).T for group in groups)
-            shares = shares / shares.sum(1).clip(OPEN)[:, None]
-        return lookup.index[cell].T, shares.T, 0 * at[0] + 1, -g
+        whole = slice(parts.begin[-1])
+        return Exchange(parts.begin, parts.node[whole].copy(), parts.share[whole].copy()), found[:3]
 
     def _open(self, p: Array, n: Array, nodes: Array) -> Array:
         """Whether (K,) no wall is between points (3, K) with unit normals (3, K) and nodes (K,): 1 or 0."""
@@ -353,23 +305,14 @@ class Around:
         far = xp.length(list(to)).clip(1e-6)
         return 1.0 * (self.field.march(p, to / far, far, halvings=0, gap=GAP, whole=True).hit == INF)
 
-    def _on_floor(self, at: Array) -> tuple[Array, ...]:
-        """Nodes (4, K) around points on the ground, their shares, what is kept in the fade, and normals."""
-        xp = self.xp
-        index, shares = ground_places(xp, at[0], at[2], isqrt(self.count - self.first))
-        index = index + self.first
-        shares = shares * (xp.take(self.nodes.weight, index.reshape(-1)).reshape(index.shape) + 1e-4)
-        kept = xp.exp((at[0] * at[0] + at[2] * at[2]) * (-1 / self.stage.ground.fade**2))
-        return index, shares / shares.sum(0), kept, xp.take(self.nodes.n, index[0])
-
     def _solved(self, direct: Array) -> Array:
         """What nodes receive (3, J) after any number of bounces, by generalised conjugate residuals
         (Eisenstat, Elman and Schultz 1983).
         """
-        xp, colour, (matrix, escaped) = self.xp, self.nodes.colour.clip(0.0, CAP), self.exchange
+        colour, (parts, escaped) = self.nodes.colour.clip(0.0, CAP), self.exchange
 
         def through(values: Array) -> Array:
-            return product(xp, matrix, xp.packed(values.T)).T
+            return load_kernel().exchanged(parts, values)
 
         r = through(direct * colour) + escaped
         x, least, kept = 0 * r, EXACT**2 * float((r * r).sum()), list[tuple[Array, Array, float]]()
@@ -389,13 +332,8 @@ class Around:
 
     def _floored(self, at: Array) -> Array:
         """What the ground sends (3, K) from points (3, K) of it."""
-        index, shares, kept, _ = self._on_floor(at)
-        return self._mixed(self.sent, index, shares) * kept + self.horizon * (1 - kept)
-
-    def _mixed(self, values: Array, index: Array, shares: Array) -> Array:
-        """Values (3, K) of those of nodes (3, J) by their indices and shares (k, K)."""
-        xp, flat = self.xp, index.reshape(-1)
-        return xp.stack([(xp.take(row, flat).reshape(index.shape) * shares).sum(0) for row in values], 0)
+        up = np.array([[0], [1], [0]], np.float32) + 0 * at
+        return self.arriving(at + OFF * up, -up)[0]
 
     def surface(self, p: Array, n: Array, last: bool = True) -> Array:
         """Light (3, K) that surfaces receive at points (3, K) with unit normals; where the lattice does not
@@ -415,63 +353,53 @@ class Around:
             numbers = np.rint(at * (EIGHTHS * self.step))
             here, up = xp.take(p, alone), xp.take(n, alone)
             xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow)[:3])
-            result[3:, alone] = self.emitters.received(here, up, self.worth)[1][: len(result) - 3]
+            result[3:, alone] = self.glow(here, up, self.worth)[1][: len(result) - 3]
         if not self.emitters.there:
             return result
-        return result[:3] + result[3:].clip(None, 1.0) * self.emitters.received(p, n, INF)[0]
+        return result[:3] + result[3:].clip(None, 1.0) * self.glow(p, n, INF)[0]
 
     def _glowing(self, p: Array, n: Array) -> Array:
         """The light (3, K) that points with unit normals (3, K) receive straight from what glows."""
-        light, free = self.emitters.received(p, n)
+        light, free = self.glow(p, n)
         return light * free
+
+    def glow(self, p: Array, n: Array, worth: float = 0.0) -> tuple[Array, Array]:
+        """The light (3, K) that points with unit normals (3, K) receive straight from what glows if nothing
+        hides it, and the parts (3, K) that arrive, by fewer rays where less is received than ``worth``; 1
+        where that is inf.
+        """
+        if not self.emitters.there:
+            return 0 * p, 0 * p + 1
+        tables, until, parts = self.field.tables, self.field.network.until_s, worth < INF
+        return load_kernel().glowing(tables, self.row, p, n, worth, parts=parts, until_s=until)[:2]
+
+    def drawn(self, p: Array) -> tuple[np.ndarray, Array, Array]:
+        """Of rays from points (3, K) to some of what glows, drawn by what surfaces that face it receive,
+        numbers (k,) of the points, unit ways (3, k), and light (3, k), in sum what arrives.
+        """
+        tables, until = self.field.tables, self.field.network.until_s
+        *_, point, ray = load_kernel().glowing(tables, self.row, p, None, 0.0, drawn=DRAWN + 1, until_s=until)
+        return point, ray[:3], ray[3:]
 
     def gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool = True) -> Array:
         """Light that points (3, K) with unit normals receive by so many rays, which numbers (2, K) turn, and
         how far halves of these are from it (6, K).
         """
-        bands = [slice(at, at + BATCH // rays) for at in range(0, max(1, p.shape[1]), BATCH // rays)]
-        parts = [self._gathered(p[:, band], n[:, band], numbers[:, band], rays, finer) for band in bands]
-        return self.xp.concat(parts, 1)
+        return self._received(
+            p, n, (TURNS @ numbers + 0.5) % 1.0, rays, finer=finer and not self.emitters.there
+        )
 
-    def _gathered(self, p: Array, n: Array, numbers: np.ndarray, rays: int, finer: bool) -> Array:
-        xp, (shift, turn) = self.xp, (TURNS @ numbers + 0.5) % 1.0
-        at = np.arange(rays)[:, None] + shift
-        local = disc(np.sqrt(at / rays), GOLDEN * at + 2 * np.pi * turn).astype(np.float32)
-        way = turned(xp, n, xp.array(local, p)).reshape(3, -1)  # (3, R K)
-        begin = xp.concat([p + OFF * n] * rays, 1) + AHEAD * way  # out of what begins there, in corners
-        light, reach = self.arriving(begin, way, finer)
-        light = light * (reach * (1 / SHUT)).clip(None, 1.0)
-        if self.mist is not None:
-            more, clear = self.mist.along(begin, way, reach)
-            light = light * clear + more
-        light, sign = light.reshape(3, rays, -1), 1.0 - np.arange(1, rays + 1)[:, None] // 2 % 2 * 2
-        return xp.concat([light.mean(1), (light * xp.array(sign.astype(np.float32), p)).mean(1)], 0)
+    def _received(self, p: Array, n: Array, turns: np.ndarray, rays: int, **more: Any) -> Array:
+        """The light of `Kernel.around`."""
+        until = self.field.network.until_s
+        return load_kernel().around(self.field.tables, self.row, p, n, turns, rays, until_s=until, **more)[0]
 
     def arriving(self, p: Array, way: Array, finer: bool = False) -> tuple[Array, Array]:
         """Light (3, K) that comes to points (3, K) from unit directions, without media, and from how far. If
         ``finer``, places nearer than nodes may be, and in hollows those where nodes differ, send rays.
         """
-        xp, limit = self.xp, to_ground(self.xp, self.stage.ground, p[1], way)
-        hit = self.field.march(p, way, limit, halvings=0, gap=GAP, whole=True).hit
-        light, reach, again = self.sky(way), xp.minimum(hit, limit), list[tuple[Array, ...]]()
-        for some, at, index, shares, kept, n in self._ends(p, way, hit, limit):
-            sent = self._mixed(self.sent, index, shares)
-            xp.put(light, some, sent * kept + self.horizon * (1 - kept))
-            if finer and not self.emitters.there:
-                part = 1 - xp.take(reach, some) / SHORT
-                if self.hollow:  # there it takes long, and gains little
-                    each = xp.take(self.sent.sum(0), index.reshape(-1)).reshape(index.shape)
-                    part = xp.sqrt((shares * (each - sent.sum(0)) ** 2).sum(0)) / DIFFER - 1
-                if len(chosen := xp.where(part > 0)):
-                    whole = index, shares, at, n, sent, part.clip(0.0, 1.0) * kept, some
-                    index, shares, *parts = (xp.take(each, chosen) for each in whole)
-                    again.append((self._mixed(self.nodes.colour, index, shares).clip(0.0, CAP), *parts))
-        if again:
-            colour, at, n, sent, part, place = (xp.concat(x, -1) for x in zip(*again, strict=True))
-            turns = SCATTER[:, None] * np.asarray(xp.to_numpy(at), np.float64)
-            here = self.lamps(at, n) + self.gathered(at, n, turns[:2] + turns[2], AGAIN, False)[:3]
-            xp.put(light, place, xp.take(light, place) + part * (colour * here - sent))
-        return light, reach
+        finer, until = finer and not self.emitters.there, self.field.network.until_s
+        return load_kernel().arriving(self.field.tables, self.row, p, way, finer, until)
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:
         """Sides (K,) in world units of cells of the lattice where points (3, K) are, and their places."""
@@ -567,7 +495,7 @@ def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples
     side, rays = LATTICE[2 if walls else 0]
     step = max(1, round(min(canvas) / side))
     points = (-(-canvas[0] // step) + 1) * (-(-canvas[1] // step) + 1)
-    number = MORE_RAYS[walls] * (nodes * RAYS[walls][0] + 2 * points * rays)
+    number = MORE_RAYS[walls] * (nodes * RAYS[walls] + 2 * points * rays)
     number += SHINY * field.rough * canvas[0] * canvas[1] * (samples / 4)
     # from balls around objects to places in those of others
     u, v, r, turn = spread(np.arange(PROBES))

@@ -17,11 +17,11 @@ from scenelang.compiler.program import ProgramError
 from scenelang.compiler.spaces import AMBIENT, LIFT, NEAREST, Camera, Light, Stage
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.image import DEEP, Image, Outputs, from_light, sample_places
-from scenelang.drawing.kernel import Asked
+from scenelang.drawing.kernel import Asked, load_kernel
 from scenelang.drawing.solid.around import CAP, ELSEWHERE, OFF, arriving, to_ground
 from scenelang.drawing.solid.centres import EACH, LARGE, Centres
 from scenelang.drawing.solid.field import SolidField
-from scenelang.drawing.solid.gloss import MIRRORS, coated, from_lamp, reflected
+from scenelang.drawing.solid.gloss import MIRRORS, coated, reflected
 from scenelang.drawing.solid.march import CAREFUL, INF, MARCH_SETTINGS, MarchSettings, Pieces, Trail, Work
 from scenelang.drawing.solid.mist import ALBEDO
 from scenelang.drawing.solid.soft import ASIDE, BEAMS, MORE_BEAMS, WIDE, form
@@ -337,7 +337,7 @@ class Lighting:
         if len(self._bare) and points.coat is not None:
             some = xp.where(points.coat[0] > 0)
             p, n, coat = (xp.take(part, some) for part in (points.p, points.n, points.coat))
-            lobe = from_lamp(xp, lamp.at, radius, p, n, coat) * lamp.power[:, None]
+            lobe = load_kernel().mirrored(lamp.at, radius, p, n, coat) * lamp.power[:, None]
             xp.put(more, some, xp.take(more, some) + lobe)
         return more
 

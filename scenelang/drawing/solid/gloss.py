@@ -23,7 +23,6 @@ FEWEST, MOST, WAYS = 4, 20, 60  # ways of a lobe, WAYS times its roughness
 MIRRORS = 2  # times that light is mirrored before a lobe counts as a diffuse surface
 OFF, STEP = 1e-3, 0.02  # world units off a surface where rays begin, and their `MarchSettings.gap`
 BATCH = 1 << 14  # rays at once
-TURNS, NODES = 8, 4  # of a lamp's disc about the mirrored way, and on each
 
 
 def coated(xp: Arrays, n: Array, back: Array, colour: Array, rough: Array) -> tuple[Array, Array]:
@@ -49,45 +48,6 @@ def _unit(xp: Arrays, a: Array) -> Array:
 
 def _cross(xp: Arrays, a: Array, b: Array) -> Array:
     return xp.stack([a[i - 2] * b[i - 1] - a[i - 1] * b[i - 2] for i in range(3)], 0)
-
-
-def lobe(xp: Arrays, n: Array, coat: Array, way: Array) -> Array:
-    """Lobes times cosines (R, K) along unit ways (3, K)."""
-    half = _unit(xp, coat[BACK] + way)
-    up, cos, square = (half * n).sum(0), (n * coat[BACK]).sum(0).clip(1e-4), coat[ROUGH] ** 4
-    facets = square / (np.pi * (up * up * (square - 1) + 1) ** 2).clip(1e-12)
-    both = _masked(xp, cos, square) * _masked(xp, (n * way).sum(0), square)
-    return facets * both / (4 * cos) * _fresnel(coat[STRAIGHT], (half * way).sum(0))
-
-
-def from_lamp(xp: Arrays, at: Array, radius: float, p: Array, n: Array, coat: Array) -> Array:
-    """The light (R, K) of a lamp of power 1 that lobes at points send back if nothing is in its way."""
-    axis, square, total = at[:, None] - p, coat[ROUGH] ** 4, 0.0
-    far = xp.sqrt((axis * axis).sum(0)).clip(1e-3)
-    axis = axis / far
-    if not radius:
-        return lobe(xp, n, coat, axis) * (np.pi / (far * far))
-    r = 2 * (n * coat[BACK]).sum(0) * n - coat[BACK]
-    x, sin = (r * axis).sum(0), (radius / far).clip(0.0, 1.0)
-    u, aside, rim = _unit(xp, axis - x * r), xp.sqrt((1 - x * x).clip(1e-12)), xp.sqrt(1 - sin * sin)
-    v = _cross(xp, r, u)
-    widest = xp.select(x > rim, 0 * x + np.pi, xp.acos(xp.sqrt(1 - (sin / aside).clip(0.0, 1.0) ** 2)))
-    for place in ((np.arange(TURNS) * 2 + 1 - TURNS) * (np.pi / 2 / TURNS)).tolist():
-        turn, ends = widest * float(np.sin(place)), []
-        y = aside * xp.cos(turn)
-        size = xp.length([x, y]).clip(1e-6)
-        cos = (rim / size).clip(0.0, 1.0)
-        half = xp.sqrt(1 - cos * cos)
-        for side in (-1, 1):  # tangents of half the angles from r, and of how many facets lie before
-            t = ((y * cos + side * x * half) / (size + x * cos - side * y * half).clip(1e-4)).clip(0.0) ** 2
-            ends.append(t / (t + square))
-        part = (ends[1] - ends[0]) * widest * float(2 * np.pi / TURNS / NODES * np.cos(place)) / square
-        for node in ((np.arange(NODES) + 0.5) / NODES).tolist():
-            share = (ends[0] + (ends[1] - ends[0]) * node).clip(0.0, 1 - 1e-6)
-            t = square * share / (1 - share)
-            way = ((1 - t) * r + 2 * xp.sqrt(t) * (xp.cos(turn) * u + xp.sin(turn) * v)) / (1 + t)
-            total = total + lobe(xp, n, coat, way) * (part * ((t + square) / (1 + t)) ** 2)
-    return total * (far > radius) / radius**2
 
 
 def reflected(lighting: Any, p: Array, n: Array, coat: Array, received: Array, mirrors: int) -> Array:

@@ -24,9 +24,10 @@ import numpy.typing as npt
 
 from scenelang.compiler.spaces import Light, Sky, Stage
 from scenelang.drawing.arrays import Array
+from scenelang.drawing.kernel import load_kernel
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.march import INF
-from scenelang.drawing.tables import BOXED, DRAWS, inverses
+from scenelang.drawing.tables import AROUND, BOXED, DRAWS, Rows, inverses
 
 Floats = npt.NDArray[np.float32]
 Shift = tuple[int, ...]
@@ -45,7 +46,7 @@ HALF_UP = 0.135  # share of the zenith's colour in directions about the horizont
 STEPS = 8, 24  # through media of light for surfaces, and of what has lamps within
 GAP = 0.03  # world units, as of `MarchSettings`
 
-AROUND: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
+NEIGHBOURS: Final = [d for d in product((-1, 0, 1), repeat=3) if any(d)]
 SHARES: Final = {1: 1 / 15, 3: 3 / 40}, {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}  # of directions, by their steps
 
 
@@ -91,8 +92,8 @@ class Mist:
         self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
         self.strides = self.sides[1] * self.sides[2], self.sides[2], 1
         axes = [a + h * np.arange(n) for a, n in zip(self.low, self.sides, strict=True)]
-        faces = np.array([[axis[at] for axis in axes] for at in (0, -1)], np.float32)
-        self.faces = [self.xp.array(face[:, None], self.field.network.codes) for face in faces]
+        # (n, 4) by nodes what their light is on the way to surfaces, and their density
+        self.haze = np.zeros((int(np.prod(self.sides)), 4), np.float32)
         self.p = np.stack(np.meshgrid(*axes, indexing="ij")).astype(np.float32)  # (3, n…)
 
     def _ask(self) -> None:
@@ -111,7 +112,7 @@ class Mist:
         looks = np.concatenate([colour.clip(0.0, ALBEDO), glow, density[None]]) * self.mist
         # nodes around media have what those next to them have
         self.count, hard = 0 * d, np.float32(1) * self.opaque
-        for shift in AROUND:
+        for shift in NEIGHBOURS:
             to, on = pair_of(self.sides, shift)
             hard[to] += self.opaque[on]
             self.count[to] += self.mist[on]
@@ -146,7 +147,7 @@ class Mist:
         """Set values (R, n…) of the nodes wanted (n…,) to the mean of their neighbours' in media, if any."""
         some, flat = np.flatnonzero(wanted), values.reshape(len(values), -1)
         dense = flat * self.mist.reshape(-1)
-        around = sum(dense.take(some + far, 1, mode="wrap") for far in np.dot(AROUND, self.strides))
+        around = sum(dense.take(some + far, 1, mode="wrap") for far in np.dot(NEIGHBOURS, self.strides))
         flat[:, some] = around / self.count.reshape(-1)[some].clip(1.0)
 
     def _reached(self, light: Light, p: np.ndarray) -> np.ndarray:
@@ -163,7 +164,7 @@ class Mist:
     def _segments(self) -> None:
         """Integrate along the ways from all nodes to their neighbours."""
         self.segments, sides, d, mist, shares = [], self.sides, self.d, self.mist, SHARES[self.lit]
-        self.directions = [d for d in AROUND if sum(map(abs, d)) in shares]
+        self.directions = [d for d in NEIGHBOURS if sum(map(abs, d)) in shares]
         for shift in self.directions:
             steps = sum(map(abs, shift))
             to, on = pair_of(sides, shift)
@@ -230,8 +231,8 @@ class Mist:
             dense = dense * (~self.opaque | (self.count > 0))
         rows = [light, ~self.opaque[None], self.d[None], self.slopes, 1 / self.thin[None] - 1]
         rows += [dense * sends, dense[None]]
-        table = np.concatenate(rows, dtype=np.float32).reshape(13, -1)
-        self.table = self.xp.array(table, self.field.network.codes)
+        self.table = np.concatenate(rows, dtype=np.float32).reshape(13, -1)
+        self.haze[:] = self.table[9:].T
 
     def _solve(self, base: list[Floats], enough: float) -> None:
         """Sweep until the light changes by no more than that (Anderson 1965)."""
@@ -277,27 +278,22 @@ class Mist:
         light = self._between(p, slice(0, 4))
         return (light[:3] / light[3].clip(1e-6)).clip(0.0)
 
+    def tell(self, row: Rows) -> None:
+        """Write what the kernel's `Around` knows of media into its row, which points to what is kept here."""
+        row["corner"], row["spacing"], row["sides"], row["steps"] = (
+            self.low,
+            self.h,
+            self.sides,
+            STEPS[self.lit],
+        )
+        row["haze"] = self.haze.ctypes.data
+
     def along(self, p: Array, way: Array, reach: Array) -> tuple[Array, Array]:
         """Light (3, K) that media send back along rays from points (3, K) in unit directions (3, K), from as
         far as a reach (K,), and the part (K,) that they let through.
         """
-        xp, steps = self.xp, STEPS[self.lit]
-        low, high = ((side - p) / xp.select(abs(way) > 1e-6, way, 0 * way + 1e-6) for side in self.faces)
-        begin = xp.largest(xp.minimum(low, high))[0].clip(0.0)
-        each = (xp.minimum(xp.least(xp.maximum(low, high)), reach) - begin).clip(0.0) / steps
-        light, clear = 0 * p, 0 * each + 1
-        some = xp.where(each > 0)
-        ahead, on, step = 0 * xp.take(p, some), xp.take(way, some), xp.take(each, some)
-        here, through = xp.take(p + way * begin, some), 0 * step + 1
-        for i in range(steps):
-            *sent, dense = self._between(here + on * ((i + 0.5) * step), slice(9, 13))
-            dense = dense.clip(1e-9)
-            past = through * xp.exp(-dense * step)
-            ahead = ahead + xp.stack(sent, 0) * ((through - past) / dense)
-            through = past
-        xp.put(light, some, ahead)
-        xp.put(clear, some, through)
-        return light, clear
+        self.tell(row := np.zeros((), AROUND))
+        return load_kernel().haze(self.field.tables, row, p, way, reach)
 
     def _between(self, p: Array, rows: slice) -> Array:
         """Rows of the table at points (3, K), linear between nodes."""

@@ -9,13 +9,13 @@ Letters: J nodes, the first ones on objects, N objects.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from typing import NamedTuple
 
 import numpy as np
 
 from scenelang.compiler.spaces import Stage
-from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.arrays import Array
+from scenelang.drawing.kernel import load_kernel
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.tables import inverses
 
@@ -54,19 +54,6 @@ def spread(index: np.ndarray, count: int = 4) -> np.ndarray:
     return np.asarray((0.5 + np.outer(ROOTS[:count], index)) % 1.0)
 
 
-def turned(xp: Arrays, n: Array, local: Array, wanted: Sequence[int] = (0, 1, 2)) -> Array:
-    """Directions (3, …, K) whose third axis is that of unit normals (3, K), or some of their coordinates
-    (Duff et al. 2017).
-    """
-    sign = xp.select(n[1] < 0, 0 * n[1] - 1, 0 * n[1] + 1)
-    a = -1 / (sign + n[1])
-    b = n[0] * n[2] * a
-    first = (1 + sign * n[0] * n[0] * a, -sign * n[0], sign * b)
-    second = (b, -n[2], sign + n[2] * n[2] * a)
-    x, y, z = local
-    return xp.stack([first[i] * x + second[i] * y + n[i] * z for i in wanted], 0)
-
-
 def sphere(u: np.ndarray, v: np.ndarray) -> np.ndarray:
     """Unit directions (3, K) of places (K,) of the unit square, equal areas of equal areas."""
     z, angle = 2 * u - 1, 2 * np.pi * v
@@ -96,8 +83,8 @@ def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
     counts = _bounded(np.ceil(shares.clip(LEAST[many], more * MOST)), ALL)
     balls = rows["reach"] * (1.0 + (rows["radius"] - 1.0).clip(None, 0.2)) + rows["moved"]
     tried = np.where(glows, _bounded(CHORDS * glows, CHORDS * ALL // NODES), counts)
-    parts = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
-    lines = np.concatenate([np.zeros((6, 0)), *parts], 1).astype(np.float32)
+    every = [np.concatenate(chords(n, ball)) for n, ball in zip(tried.tolist(), balls, strict=True) if n]
+    lines = np.concatenate([np.zeros((6, 0)), *every], 1).astype(np.float32)
     objects = np.repeat(np.arange(len(sizes)), tried)
     linear = rows["map"][:, :9].reshape(-1, 3, 3).astype(np.float64)
     back = inverses(linear)
@@ -105,7 +92,8 @@ def on_objects(field: SolidField, stage: Stage, many: bool) -> Nodes:
     world = (back[objects] @ ends).astype(np.float32).transpose(2, 1, 0)  # begins and ways (3, K)
     rates = rows["rate"][objects] * np.linalg.norm(lines[3:], axis=0)
     begin, way = world
-    line, along = _crossings(field, objects, begin, way, rates, np.where(glows, FINE, COARSE)[objects])
+    parts = 1 / np.where(glows, FINE, COARSE)[objects]
+    line, along = load_kernel().crossings(field.tables, objects, begin, way, rates, parts)
     owner, at = objects[line], lines[:3, line] + lines[3:, line] * along
     # each stands for as much of the surface behind the map
     area = (2 * np.pi * balls**2 / tried.clip(1))[owner].astype(np.float32)
@@ -124,36 +112,6 @@ def _bounded(counts: np.ndarray, most: int) -> np.ndarray:
     part = min(1.0, most / max(float(counts.sum()), 1.0))
     whole: np.ndarray = np.diff(np.floor(np.cumsum(counts) * part), prepend=0.0)
     return whole.astype(int)
-
-
-def _crossings(
-    field: SolidField,
-    objects: np.ndarray,
-    begin: np.ndarray,
-    way: np.ndarray,
-    rates: np.ndarray,
-    parts: np.ndarray,
-) -> tuple[np.ndarray, np.ndarray]:
-    """Lines (k,) that meet the surfaces of their objects (K,), and how far along (k,), from 0 to 1.
-
-    Lines begin at (3, K) and go all the way (3, K). Steps are as long as the distance, which changes at rates
-    (K,) at most, and at least so small a part of a line.
-    """
-
-    def distance(index: np.ndarray, t: np.ndarray) -> np.ndarray:
-        return np.asarray(field.own(objects[index], begin[:, index] + way[:, index] * t, gradient=False)[0])
-
-    index, t = np.arange(len(objects)), np.zeros(len(objects), np.float32)
-    d, lines, places = distance(index, t), [index[:0]], [t[:0]]
-    while len(index):
-        step = np.maximum(abs(d) / rates[index], 1 / parts[index]).astype(np.float32)
-        past = distance(index, t + step)
-        met = np.flatnonzero((past < 0) != (d < 0))
-        lines.append(index[met])
-        places.append(t[met] + step[met] * d[met] / (d[met] - past[met]))
-        on = np.flatnonzero(t + step < 1)
-        index, t, d = index[on], (t + step)[on], past[on]
-    return np.concatenate(lines), np.concatenate(places).astype(np.float32)
 
 
 def _settled(field: SolidField, stage: Stage, p: Array, across: Array, area: Array, place: Array) -> Nodes:
@@ -203,20 +161,3 @@ def on_ground(field: SolidField, stage: Stage, many: bool) -> Nodes:
     d = field.near(p, 0 * p[0] + COVERED).distance if p.shape[1] else p[0]
     place = xp.concat([p, xp.full((5, p.shape[1]), 1.0, p)], 0)
     return Nodes(p, n, colour, 0 * p, (d / COVERED).clip(0.0, 1.0), 0 * p[0], place)
-
-
-def ground_places(xp: Arrays, x: Array, z: Array, side: int) -> tuple[Array, Array]:
-    """The four of side² nodes of the ground (4, K) around places (K,), from 0, and their shares (4, K)."""
-    rows, parts = [], []
-    for place in (x, z):
-        scaled = place * (float(np.sinh(WARP)) / FAR)
-        size = abs(scaled)
-        u = xp.log(size + xp.sqrt(size * size + 1)) * xp.select(scaled < 0, 0 * x - 1, 0 * x + 1) / WARP
-        at = ((u + 1) * ((side - 1) / 2)).clip(0.0, side - 1.001)
-        low = xp.floor(at)
-        rows.append(xp.whole(low))
-        parts.append(at - low)
-    (i, j), (a, b) = rows, parts
-    first = j * side + i
-    index = xp.stack([first, first + 1, first + side, first + side + 1], 0)
-    return index, xp.stack([(1 - a) * (1 - b), a * (1 - b), (1 - a) * b, a * b], 0)
