@@ -208,7 +208,8 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
     """The fastest offer that keeps the error, or the one of least error that keeps the time; and lines why.
 
     Of offers that promise nearly the same error, within 2 %, the faster one is better; where none promises
-    any, the slowest, which takes most samples. With both limits the fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
+    any, the slowest, which takes most samples. With both limits the fastest that keeps both is taken. Raises
+    `NothingFits` where no offer keeps them.
     """
     if not offers:
         reasons = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
