@@ -16,7 +16,7 @@ from __future__ import annotations
 
 import hashlib
 import json
-from collections.abc import Iterable
+from collections.abc import Iterable, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Final, NamedTuple
@@ -129,6 +129,11 @@ class Place(NamedTuple):
     column: int
     end_line: int
     end_column: int
+
+
+def written(places: Sequence[Place | None]) -> str:
+    """The first place that is known, for a message."""
+    return next((f" ({place.file}:{place.line}:{place.column})" for place in places if place), "")
 
 
 @dataclass(frozen=True, slots=True, eq=False)

@@ -116,10 +116,14 @@ HELP: Final = {
 LESS: Final = "draw it smaller, with fewer objects or lamps, or with --patient"
 
 
+class OutOfTime(RenderError):
+    """The time that a picture may take is over."""
+
+
 def check_time(until_s: float) -> None:
-    """Raise `RenderError` where the process has used more than so many processor seconds."""
+    """Raise `OutOfTime` where the process has used more than so many processor seconds."""
     if time.process_time() > until_s:
-        raise RenderError(f"more work than was foretold, and than a picture may take; {LESS}")
+        raise OutOfTime(f"more work than was foretold, and than a picture may take; {LESS}")
 
 
 KEEP_BYTES = 256 << 20

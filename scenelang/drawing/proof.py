@@ -36,7 +36,7 @@ from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import ALIKE, PLANE
 from scenelang.compiler.steps import IDENTITY, Affine, Rows, Skin, Step, Warp, compose
 from scenelang.drawing.exact.field import along, carry_back, colour_at, leaf_distance, placed_leaves
-from scenelang.drawing.how import RenderError
+from scenelang.drawing.how import RenderError, check_time
 from scenelang.drawing.image import PROVED, Image, Proof, from_samples
 from scenelang.drawing.neural.frames import Frames
 from scenelang.drawing.neural.meetings import (
@@ -433,12 +433,19 @@ ROUNDING = 2e-7  # of a channel: what is lost where pictures are kept in float32
 
 
 def prove_image(
-    lowered: Graph, graph: Graph, manifest: Manifest, image: Image, *, redraw: bool = False
+    lowered: Graph,
+    graph: Graph,
+    manifest: Manifest,
+    image: Image,
+    *,
+    redraw: bool = False,
+    until_s: float = inf,
 ) -> tuple[Image, Proof]:
     """Prove by how much each pixel of an image, whoever drew it, differs from the exact one at most: the
     picture and its proof, from the scene as written and its stream of leaves.
 
-    If ``redraw``, pixels not proved right to `PROVED` are drawn again. Raises as `check_proved`.
+    If ``redraw``, pixels not proved right to `PROVED` are drawn again. Raises as `check_proved`
+    and, at ``until_s``, `check_time`.
     """
     check_proved(manifest)
     stream = Stream(lowered, graph, manifest)
@@ -453,6 +460,7 @@ def prove_image(
     bound, redrawn = np.empty((height, width), np.float32), 0
     rows = -(-max(1, int(BAND / width / (1 + stream.crowd(graph.canvas) / CROWD))) // SIDES[0]) * SIDES[0]
     for top in range(0, height, rows):
+        check_time(until_s)
         part = range(top, min(top + rows, height))
         band = Band(stream, graph.canvas, part, behind, isqrt(graph.samples))
         drawn = picture[part.start : part.stop]

@@ -8,7 +8,16 @@ from collections.abc import Callable, Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Unpack, get_args
 
-from scenelang.drawing.how import DEFAULT, Backend, How, Options, RenderError, keep_memory, threads_for
+from scenelang.drawing.how import (
+    DEFAULT,
+    Backend,
+    How,
+    Options,
+    RenderError,
+    check_time,
+    keep_memory,
+    threads_for,
+)
 from scenelang.drawing.image import PLANE, Output, Outputs, Proof, Source
 from scenelang.language.diagnostics import Diagnostics
 from scenelang.language.reports import SceneError
@@ -45,18 +54,30 @@ def exact_graph(scene: Scene, spans: Spans | None = None) -> tuple[Graph, dict[s
 
 
 def draw_exact(
-    scene: Scene, *, spans: Spans | None = None, progress: Callable[[float], None] | None = None
+    scene: Scene,
+    *,
+    spans: Spans | None = None,
+    patient: bool = False,
+    progress: Callable[[float], None] | None = None,
 ) -> Image:
     """Draw a scene by the exact definition, from its graph as written, before any pass.
 
     Raises `SceneError` for what the model does not have, `RenderError` where there is no picture from where
-    the eye is, or no original of an element.
+    the eye is, or no original of an element, or it takes longer than a picture may, unless ``patient``.
     """
     from scenelang.drawing.exact.picture import reference_image
+    from scenelang.drawing.work import until_s
 
     graph, brought = exact_graph(scene, spans)
+    over_s = until_s(scene.canvas, patient)
+
+    def drawn(share: float) -> None:
+        check_time(over_s)
+        if progress is not None:
+            progress(share)
+
     try:
-        return reference_image(graph, brought=brought, progress=progress or (lambda _: None))
+        return reference_image(graph, brought=brought, progress=drawn)
     except ValueError as error:
         raise RenderError(str(error)) from None
 
@@ -122,7 +143,7 @@ def render(
     way = How(**how).checked()
     result, spans = given(program_or_scene, size, way.backend)
     if isinstance(result, Scene):
-        return draw_exact(way.sampled(result), spans=spans, progress=progress)
+        return draw_exact(way.sampled(result), spans=spans, patient=way.patient, progress=progress)
     return draw(result, way, progress=progress).image
 
 
@@ -205,11 +226,13 @@ def prove_drawn(
     """
     from scenelang.compiler.manifest import load_manifest
     from scenelang.drawing.proof import check_proved, prove_image
+    from scenelang.drawing.work import until_s
 
     keep_memory()
     check_proved(manifest := load_manifest(model))
     lowered, stream = (how.sampled(graphs[name]) for name in ("lower", "flatten"))
-    return prove_image(lowered, stream, manifest, draw(), redraw=redraw)
+    image, over_s = draw(), until_s(lowered.canvas, how.patient)
+    return prove_image(lowered, stream, manifest, image, redraw=redraw, until_s=over_s)
 
 
 def render_outputs(

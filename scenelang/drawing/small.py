@@ -47,7 +47,9 @@ def choose_drawer(
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
     if renderer == "solid":
-        return ("numpy", "solids are") if there_is_a_kernel() else ("torch", "there is no kernel")
+        return (
+            ("numpy", "as solids are by default") if there_is_a_kernel() else ("torch", "there is no kernel")
+        )
     if renderer != "framed":
         return "torch", f"a `{renderer}` network is large work for any picture"
     ms = work_ms(program, samples)

@@ -6,6 +6,7 @@ always the same. A picture of too much is drawn coarser, or not at all.
 
 from __future__ import annotations
 
+import time
 from dataclasses import replace
 from typing import Any, Final, NamedTuple
 
@@ -128,7 +129,9 @@ def work_ms(program: Program, samples: Samples = "adaptive", load: Load | None =
 BOUND_S, LEAST_S = 300.0, 45.0  # processor seconds that a picture of 256 x 256 may take, and the smallest
 SURE: Final = 0.5  # of these; where more is foretold, a picture is drawn coarser
 EASY: Final = 1 << 24  # objects times pixels and lamps of solids without a sky that never take long
+FIRST: Final = 0.8  # of what is allowed, after which a picture is begun again, coarser
 COARSER: Final = (1, 2, 4, 8)  # pixels across that one stands for
+LATE: Final = 4  # of these, where a picture took longer than was foretold
 
 
 def allowed_s(canvas: tuple[int, int]) -> float:
@@ -136,12 +139,17 @@ def allowed_s(canvas: tuple[int, int]) -> float:
     return LEAST_S + (BOUND_S - LEAST_S) * canvas[0] * canvas[1] / 256**2
 
 
+def until_s(canvas: tuple[int, int], patient: bool = False, part: float = 1.0) -> float:
+    """Processor seconds of the process when a part of the time of a picture that begins now is over."""
+    return float("inf") if patient else time.process_time() + part * allowed_s(canvas)
+
+
 class Plan(NamedTuple):
     """A way to draw a Program within bounds."""
 
     canvas: tuple[int, int]
     even: bool = False  # with even light in place of the sky's
-    told: str | None = None  # what is coarser than asked for, and why
+    told: str = ""  # what is coarser than asked for, and why
 
 
 def plan_of(program: Program, network: Any, samples: Samples = "adaptive") -> Plan:
@@ -158,8 +166,18 @@ def plan_of(program: Program, network: Any, samples: Samples = "adaptive") -> Pl
             seconds = work_ms(program, samples, part) / 1e3
             why = why or f"about {seconds:,.0f} s of work, and {most:,.0f} are allowed"
             if seconds <= most:
-                canvas = -(-width // across), -(-height // across)
-                how = f"drawn at {canvas[0]} x {canvas[1]}" + ", by even light in place of the sky's" * even
-                coarser = even or across > 1
-                return Plan(canvas, even, f"{why}: {how}; --patient draws all of it" if coarser else None)
+                told = f"{why}: " if even or across > 1 else ""
+                return _coarser(program, across, even, told)
     raise RenderError(f"{why} at {width} x {height}; {LESS}")
+
+
+def late_plan(program: Program) -> Plan:
+    """How a Program is drawn where it took longer than was foretold."""
+    sky = program.stage is not None and program.stage.sky is not None
+    return _coarser(program, LATE, sky, "more work than was foretold: ")
+
+
+def _coarser(program: Program, across: int, even: bool, why: str) -> Plan:
+    width, height = (-(-side // across) for side in program.canvas)
+    how = f"drawn at {width} x {height}" + ", by even light in place of the sky's" * even
+    return Plan((width, height), even, why and f"{why}{how}; --patient draws all of it")

@@ -207,8 +207,9 @@ def offers(points: Sequence[Point], load: Load, canvas: tuple[int, int], scale: 
 def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> tuple[Offer, list[str]]:
     """The fastest offer that keeps the error, or the one of least error that keeps the time; and lines why.
 
-    Of offers that promise nearly the same error, within 2 %, the faster one is better. With both limits the
-    fastest that keeps both is taken. Raises `NothingFits` where no offer keeps them.
+    Of offers that promise nearly the same error, within 2 %, the faster one is better; where none promises
+    any, the slowest, which takes most samples. With both limits the fastest that keeps both is taken. Raises
+    `NothingFits` where no offer keeps them.
     """
     if not offers:
         reasons = "; ".join(f"{name}: {why}" for name, why in list(refused.items())[:3])
@@ -221,9 +222,11 @@ def choose(offers: Sequence[Offer], limits: Limits, refused: dict[str, str]) -> 
         limit = f"FLIP {limits.flip:g}" + (f" and {limits.ms:g} ms" if limits.ms is not None else "")
         why = f"the fastest of {len(good)} that keep {limit}"
     else:
-        least = min(o.flip for o in good)
+        least, way = min(o.flip for o in good), "most exact"
         first = min((o for o in good if o.flip <= 1.02 * least), key=lambda o: o.ms)
-        why = f"the most exact of {len(good)} that keep {limits.ms:g} ms"
+        if least == 1:
+            first, way = max(good, key=lambda o: o.ms), "slowest"
+        why = f"the {way} of {len(good)} that keep {limits.ms:g} ms"
     notes = [f"chosen by the frontier: {first.told()}, {why}"]
     others = [offer for offer in offers if offer is not first]
     by, worse = ("ms", "slower") if limits.flip is not None else ("flip", "no more exact")

@@ -90,7 +90,9 @@ class Painter:
         from scenelang.drawing.render import draw, draw_exact
 
         if frame.program is None:
-            return draw_exact(self.how.sampled(frame.shot.scene), spans=frame.shot.spans)
+            return draw_exact(
+                self.how.sampled(frame.shot.scene), spans=frame.shot.spans, patient=self.how.patient
+            )
         how = self.how._replace(threads=self.split(frame.program))
         place, split = frame.place, how.threads
         return draw(frame.program, how, place=place, split=split, kept=self.kept, progress=progress).image

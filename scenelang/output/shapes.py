@@ -9,7 +9,7 @@ from typing import Final, cast
 
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.manifest import load_manifest
-from scenelang.compiler.program import Program, ProgramError
+from scenelang.compiler.program import Program, ProgramError, written
 from scenelang.compiler.weights import ModelError
 from scenelang.drawing.how import Backend, How, RenderError, keep_memory
 from scenelang.drawing.render import given
@@ -132,7 +132,7 @@ def _program(
         except FileNotFoundError as error:
             raise RenderError(f"a model has no weights here: {error.filename}") from None
     if (program.stage is None) != flat:
-        fact = "an SVG of solids" if flat else "a mesh of a flat scene"
+        fact = ("an SVG of solids" if flat else "a mesh of a flat scene") + written(program.places)
         other = "write a mesh, such as .glb, or a picture" if flat else "write an .svg or a picture"
         diagnostics.add("E0551", fact, None, help=other)
         raise SceneError(diagnostics)

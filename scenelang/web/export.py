@@ -10,6 +10,7 @@ import json
 import os
 import re
 import unicodedata
+import warnings
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass, field, replace
@@ -27,8 +28,10 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.groups import SMOOTH, SUBTRACT, UNION, read_groups
 from scenelang.compiler.lifting import LAYOUTS
 from scenelang.compiler.manifest import load_manifest
-from scenelang.compiler.program import Program, ProgramError, load_program
+from scenelang.compiler.program import Program, ProgramError, load_program, written
 from scenelang.compiler.spaces import encoded, stage_data
+from scenelang.drawing.how import OutOfTime
+from scenelang.drawing.neural.draw import timed
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.network import FramedArrays
 from scenelang.drawing.render import render
@@ -41,7 +44,7 @@ from scenelang.language.scene import Animation, Scene
 from scenelang.web import plane, solid
 from scenelang.web.arrays import ArrayStore, packed, paints_of, rows_of, script, shapes_of, web, worn_of
 from scenelang.web.form import PageProgram, form_of
-from scenelang.web.volume import FULL, Detail, volume
+from scenelang.web.volume import FULL, OPEN, Detail, volume
 
 if TYPE_CHECKING:
     import PIL.Image
@@ -169,7 +172,10 @@ def view_of(
     if not manifest.framed:
         raise ProgramError(f"model `{manifest.name}` has learned transformations, which no page draws")
     if beyond_pages(program) and not draft:
-        fact, help = "`glossy` or `metal`, which no page draws", "draw a picture or a video of it"
+        rough = LAYOUTS[3].unpack(program.vectors).roughness.reshape(len(program), -1).any(1)
+        place = written([place for place, there in zip(program.places, rough, strict=True) if there])
+        fact = f"`glossy` or `metal`{place}, which no page draws"
+        help = "draw a picture or a video of it"
         raise SceneError([Diagnostic("E0560", fact, None, help=help)])
     network, digest = load_arrays(program.model, program.weights)
     program.check_weights(digest)
@@ -211,7 +217,12 @@ def view_of(
     elif isinstance(network, SolidArrays):
         data |= solid.shader(network, store)
         if has_sky(program):
-            data["around"] = volume(program, network, store, draft or FULL)
+            try:
+                with timed(network, program, patient=False):
+                    data["around"] = volume(program, network, store, draft or FULL)
+            except OutOfTime:
+                data["around"] = volume(program, network, store, OPEN)
+                warnings.warn("light that takes long: as if nothing stood in its way", stacklevel=2)
     data["alt"] = alternative(data)
     return PagePayload(data, store.bytes())
 

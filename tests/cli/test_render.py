@@ -71,7 +71,7 @@ def test_who_is_patient_gets_all_of_a_picture(folder: Folder, monkeypatch: pytes
     whole = [picture(folder.path / name) for name in ("still.png", "film-01.png")]
     for name in ("LEAST_S", "BOUND_S"):
         monkeypatch.setattr(work, name, 0.02)
-    monkeypatch.setattr(draw, "allowed_s", lambda _: 60.0)
+    monkeypatch.setattr(draw, "until_s", lambda *_: float("inf"))
     for name, out in ways:
         with pytest.warns(UserWarning, match=f"{name}: about .* drawn at .* x .*; --patient draws all of it"):
             folder.run("render", name, "-o", out, code=0)

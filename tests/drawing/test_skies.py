@@ -33,7 +33,7 @@ def test_blends_under_a_sky_warn_of_nothing() -> None:
     nsg.render(nsg.loads(text), backend="exact")
 
 
-@pytest.mark.parametrize("seed", [8, 12, 30, 32, 36, 43, 49, 63, 68, 118, 126, 130, 148])
+@pytest.mark.parametrize("seed", [8, 12, 30, 32, 36, 43, 49, 63, 68, 118, 126, 130, 148, 1749])
 def test_a_random_sky_is_drawn(seed: int) -> None:
     check(encode(drawn(seed)))
 

@@ -107,7 +107,7 @@ def test_a_picture_of_too_much_is_drawn_coarser(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(work, "LEAST_S", 1.2 * work_ms(replace(drawn, canvas=(32, 32))) / 1e3)
     monkeypatch.setattr(work, "BOUND_S", work.LEAST_S)
     monkeypatch.setattr(work, "SURE", 1.0)
-    monkeypatch.setattr(draw, "allowed_s", lambda _: 60.0)
+    monkeypatch.setattr(draw, "until_s", lambda *_: float("inf"))
     with pytest.warns(
         UserWarning, match=r"s of work, and .* are allowed: drawn at 32 x 32; --patient draws all"
     ):
@@ -122,7 +122,7 @@ def test_too_much_light_from_everywhere_is_even(monkeypatch: pytest.MonkeyPatch)
     monkeypatch.setattr(work, "LEAST_S", work_ms(drawn, load=load._replace(light=0.5 * load.light)) / 1e3)
     monkeypatch.setattr(work, "BOUND_S", work.LEAST_S)
     monkeypatch.setattr(work, "SURE", 1.0)
-    monkeypatch.setattr(draw, "allowed_s", lambda _: 60.0)
+    monkeypatch.setattr(draw, "until_s", lambda *_: float("inf"))
     with pytest.warns(UserWarning, match="drawn at 24 x 24, by even light in place of the sky's"):
         coarse = nsg.render(drawn)
     assert np.isfinite(coarse).all()
@@ -142,13 +142,38 @@ def test_what_cannot_be_drawn_in_time_is_refused_before_it_starts(monkeypatch: p
 def test_the_clock_ends_what_was_foretold_wrongly(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     drawn = program(text)
     with monkeypatch.context() as patch:
-        patch.setattr(draw, "allowed_s", lambda _: -1.0)
+        patch.setattr(draw, "until_s", lambda canvas, patient, part: float("inf") if patient else -1.0)
         with pytest.raises(RenderError, match=r"more work than was foretold.*--patient"):
             nsg.render(drawn)
         with pytest.raises(RenderError, match="more work than was foretold"):
             nsg.render_outputs(drawn, ["alpha"])
         patient = nsg.render(drawn, patient=True)
     assert np.array_equal(nsg.render(drawn), patient)
+
+
+@pytest.mark.parametrize("text", [discs(5), BALL, SKY])
+def test_a_picture_that_takes_longer_than_foretold_is_drawn_coarser(
+    text: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """It was refused when its time was over."""
+    drawn = program(text)
+    with monkeypatch.context() as patch:
+        patch.setattr(draw, "until_s", lambda _, __, part: -1.0 if part == work.FIRST else float("inf"))
+        with pytest.warns(UserWarning, match="more work than was foretold: drawn at 6 x 6.*--patient draws"):
+            coarse = nsg.render(drawn)
+    assert coarse.shape == (24, 24, 3)
+    if text != SKY:
+        assert np.array_equal(coarse, enlarged(nsg.render(replace(drawn, canvas=(6, 6))), (24, 24)))
+
+
+def test_exact_pictures_and_proofs_are_bounded(monkeypatch: pytest.MonkeyPatch) -> None:
+    scene = nsg.loads("nsg 1; canvas(16, 16); disc;")
+    monkeypatch.setattr(work, "allowed_s", lambda _: -1.0)
+    with pytest.raises(RenderError, match="more work than was foretold"):
+        nsg.render(scene, backend="reference")
+    with pytest.raises(RenderError, match="more work than was foretold"):
+        nsg.prove(scene, nsg.render(scene, patient=True))
+    nsg.prove(scene, nsg.render(scene, backend="reference", patient=True), patient=True)
 
 
 def test_the_time_allowed_grows_with_the_pixels() -> None:

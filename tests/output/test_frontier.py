@@ -146,6 +146,12 @@ def test_the_choice_is_the_cheapest_that_suffices() -> None:
     assert between([*LADDER, point("timed", 4, None)]) == 1
 
 
+def test_without_a_promise_the_choice_is_the_slowest_that_suffices() -> None:
+    """A draft was chosen before one sample where no error is promised, as it was the faster."""
+    sky = LOAD._replace(light=1.0)
+    assert [chosen(Limits(ms, None), load=sky) for ms in (3, 30, 1000)] == ["fast", "middle", "bad"]
+
+
 @given(
     st.lists(st.tuples(st.integers(1, 9), st.integers(0, 9)), min_size=1, max_size=8),
     st.none() | st.integers(0, 10),

@@ -41,7 +41,7 @@ def command(ctx: click.Context, scene: str, out: str | None, request: options.Re
     picture = over_white(draw(job.program, how).image)
     with Bar() as bar:
         progress = partial(bar, "drawing the exact picture", total=1)
-        exact = over_white(draw_exact(job.scene, spans=job.spans, progress=progress))
+        exact = over_white(draw_exact(job.scene, spans=job.spans, patient=how.patient, progress=progress))
     figures = compare(picture, exact)
     text = f"PSNR {figures['psnr']:.2f} dB  SSIM {figures['ssim']:.4f}  FLIP {figures['flip']:.4f}"
     side_by_side(picture, exact, text).save(target)

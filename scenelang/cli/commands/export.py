@@ -7,7 +7,7 @@ import click
 from scenelang.assets.files import write_output
 from scenelang.cli import options
 from scenelang.cli.files import PAGE, shown, stem_of, targets
-from scenelang.cli.say import Clock, say_trouble
+from scenelang.cli.say import Clock, say_diagnostics, say_trouble
 
 
 @click.command("export")
@@ -53,7 +53,11 @@ def command(
         try:
             with clock("view"):
                 view = scene_view(job.program, job.scene, job.evaluation, title=title or stem_of(job.name))
-        except (ProgramError, SceneError) as error:
+        except SceneError as error:
+            say_diagnostics(error.diagnostics)
+            code = max(code, 1)
+            continue
+        except ProgramError as error:
             say_trouble(f"{job.name}: {error}")
             code = 2
             continue

@@ -391,7 +391,7 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
         assert job.scene is not None
         with clock("draw"):
             scene = how.sampled(job.scene)
-            image = draw_exact(scene, spans=job.spans, progress=progress)
+            image = draw_exact(scene, spans=job.spans, patient=how.patient, progress=progress)
         chance = f", standard error {image.noise:.2g}" if image.noise else ""
         job.notes.append(f"drew the exact picture, {scene.samples} samples a pixel{chance}")
         return image

@@ -7,7 +7,6 @@ where they are computed. Where all of those are, bit for bit, as in the picture 
 from __future__ import annotations
 
 import hashlib
-import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import field, replace
@@ -18,7 +17,7 @@ import numpy.typing as npt
 
 from scenelang.assets.records import Record
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.drawing.how import Care
+from scenelang.drawing.how import Care, OutOfTime
 from scenelang.drawing.image import Image, Outputs, enlarged, from_samples
 from scenelang.drawing.neural.coverage import Coverage, Tile
 from scenelang.drawing.neural.field import Field
@@ -29,7 +28,7 @@ from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
 from scenelang.drawing.solid.plain import solid_field
-from scenelang.drawing.work import Plan, allowed_s, plan_of
+from scenelang.drawing.work import FIRST, Plan, late_plan, plan_of, until_s
 
 _ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
 
@@ -104,14 +103,15 @@ class Drawing(Record, frozen=False):
     refined: int  # pixels of which all samples were taken
     met: int  # pixels that an object reached; the others show the background, unseen by the network
     work: Work | None = None  # of solids, what it took in rays and steps
-    coarser: str | None = None  # why it is coarser than asked for, if it is
+    coarser: str = ""  # why it is coarser than asked for, if it is
 
 
 @contextmanager
-def _timed(network: FramedNetwork | SolidNetwork, program: Program, patient: bool) -> Iterator[None]:
-    """Have the network raise `RenderError` when the time of a picture is over, unless patient."""
-    if not patient:
-        network.until_s = time.process_time() + allowed_s(program.canvas)
+def timed(
+    network: FramedNetwork | SolidNetwork, program: Program, patient: bool, part: float = 1.0
+) -> Iterator[None]:
+    """Have the network raise `OutOfTime` when a part of the time of a picture is over, unless patient."""
+    network.until_s = until_s(program.canvas, patient, part)
     try:
         yield
     finally:
@@ -121,14 +121,24 @@ def _timed(network: FramedNetwork | SolidNetwork, program: Program, patient: boo
 def draw_objects(
     network: FramedNetwork | SolidNetwork, program: Program, *, skip: bool = True, **run: Unpack[Run]
 ) -> Drawing:
-    """Draw a Program, as of `Run`, in the time that there is; raises `RenderError` where it is too short."""
-    program, plan, patient = sized(program), Plan(program.canvas), run.pop("patient", False)
-    if not patient:
-        plan = plan_of(program, network, run.get("samples", "adaptive"))
-    with _timed(network, program, patient):
+    """Draw a Program, as of `Run`, in the time that there is, coarser where it turns out too short; raises
+    `RenderError` where even that takes longer.
+    """
+    program, patient = sized(program), run.pop("patient", False)
+
+    def drawn(plan: Plan, part: float) -> Drawing:
         coarse = program if plan.canvas == program.canvas else replace(program, canvas=plan.canvas)
-        drawing = _drawn(network, coarse, skip, plan.even, run)
-    return replace(drawing, image=enlarged(drawing.image, program.canvas), coarser=plan.told)
+        with timed(network, program, patient, part):
+            drawing = _drawn(network, coarse, skip, plan.even, run.copy())
+        return replace(drawing, image=enlarged(drawing.image, program.canvas), coarser=plan.told)
+
+    if patient:
+        return drawn(Plan(program.canvas), 1.0)
+    plan = plan_of(program, network, run.get("samples", "adaptive"))
+    try:
+        return drawn(plan, FIRST)
+    except OutOfTime:
+        return drawn(late_plan(program), 1 - FIRST)
 
 
 def _drawn(
@@ -234,7 +244,7 @@ def program_outputs(
     """All outputs of a Program, numbered as in the scene; raises ProgramError for numbers of no scene, and
     `RenderError` where the time of a picture is over.
     """
-    with _timed(network, program, patient):
+    with timed(network, program, patient):
         return _outputs(network, program, threads)
 
 

@@ -249,7 +249,8 @@ class Mist:
                 changes, lights = (np.diff(np.stack(part), axis=0) for part in zip(*kept, strict=True))
                 gram = np.einsum("ik,jk->ij", changes, changes).astype(np.float64)
                 gram += 1e-7 * np.trace(gram) * np.eye(len(gram))
-                mix = np.linalg.solve(gram, np.einsum("ik,k->i", changes, kept[-1][0])).astype(np.float32)
+                off = np.einsum("ik,k->i", changes, kept[-1][0])
+                mix = np.linalg.lstsq(gram, off)[0].astype(np.float32)  # changes may be too small to tell
                 self.light = (kept[-1][1] - np.einsum("i,ik->k", mix, lights)).reshape(swept.shape)
 
     def _sweep(self, base: list[Floats]) -> Floats:
