@@ -14,7 +14,8 @@
                      int32_t, int32_t, float *, float *, int32_t *, float *, int64_t *, Piece *, int64_t, void *); \
     void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
                    float *, int64_t *, void *); \
-    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *);
+    void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *); \
+    void plane_##v(const Flat *, const Page *, int32_t, int32_t, float *, int32_t *, int64_t *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -41,10 +42,11 @@ OUT int32_t newest(void) { return 0; }
 #endif
 OUT const char *mark(void) { return MARK; }  // a digest of the sources
 // What tables.py has to agree with.
-OUT void sizes(int32_t r[9]) {
-    size_t all[9] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
-                     sizeof(Lamp), sizeof(Stage)};
-    for (int i = 0; i < 9; i++) r[i] = (int32_t)all[i];
+OUT void sizes(int32_t r[15]) {
+    size_t all[15] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
+                     sizeof(Lamp), sizeof(Stage), sizeof(Shape), sizeof(FlatStep), sizeof(Leaf), sizeof(Joint), sizeof(Flat),
+                     sizeof(Page)};
+    for (int i = 0; i < 15; i++) r[i] = (int32_t)all[i];
 }
 OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); }
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
@@ -67,4 +69,8 @@ OUT void cones(int32_t variant, const Scene *s, int64_t n, const float *at, floa
 OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, int64_t across, const float *way, float *light,
                float *alpha, int64_t *counts, void *memory) {
     PICK(shade, s, stage, n, across, way, light, alpha, counts, memory);
+}
+OUT void plane(int32_t variant, const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t *counts,
+               void *memory) {
+    PICK(plane, s, g, top, rows, out, owner, counts, memory);
 }

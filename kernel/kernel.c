@@ -1,5 +1,6 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
 #include "cone.h"
+#include "plane.h"
 #include "shade.h"
 #define BLOCK (256 / W)  // packets that have a list of objects in common
 #ifndef NAME
@@ -253,4 +254,27 @@ void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, 
         }
     }
     counts[0] = w.lights; counts[1] = w.near; counts[2] = w.steps; counts[3] = w.met; counts[4] = w.lost;
+}
+// Rows of a picture of the plane from `top` on: premultiplied colours (rows, width, 4), or over a background (rows, width, 3),
+// or, unless null, the owners of pixels instead. Counts are of pairs of points and objects, of pixels of which all samples
+// were taken, of those that were asked one by one, and of numbers that are none. Scratch is 64 bytes for each object and group.
+void NAME(plane)(const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t counts[4], void *scratch) {
+    Target t = {s, g, out, owner, 0, top, g->width, top + rows};
+    Entry *entries = aligned(scratch);
+    Work2 w = {.macro = entries, .tile = entries + s->objects, .turn = (Turn *)(entries + 2 * (size_t)s->objects)};
+    w.row = (int32_t *)(w.turn + s->objects + s->groups);
+    for (int y = top; y < top + rows; y += 64) {
+        double low[2], high[2];
+        int some = 0;
+        low[0] = -INFINITY; high[0] = INFINITY;
+        high[1] = g->north - g->step * (y - 0.5) + 1e-6; low[1] = g->north - g->step * (y + 63.5) - 1e-6;
+        for (int i = 0; i < s->objects; i++) if (meets(s->shape + i, low, high)) w.row[some++] = i;
+        for (int x = 0; x < g->width; x += 64) {
+            int count = 0;
+            low[0] = g->west + g->step * (x - 0.5) - 1e-6; high[0] = g->west + g->step * (x + 63.5) + 1e-6;
+            for (int i = 0; i < some; i++) if (meets(s->shape + w.row[i], low, high)) w.macro[count++].object = w.row[i];
+            macro(&t, w.macro, count, x, y, &w);
+        }
+    }
+    counts[0] = w.pairs; counts[1] = w.refined; counts[2] = w.met; counts[3] = w.wrong;
 }

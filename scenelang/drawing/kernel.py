@@ -18,8 +18,10 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.how import RenderError, check_time
+from scenelang.drawing.neural import tables as flat
 from scenelang.drawing.tables import (
     CELL,
     DECODER,
@@ -36,12 +38,15 @@ from scenelang.drawing.tables import (
 
 FOLDER: Final = Path(__file__).resolve().parent
 ROOT: Final = FOLDER.parents[1]  # of a checkout
-_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE)
+_ROWS: Final = (
+    *(OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE),
+    *(flat.SHAPE, flat.STEP, flat.LEAF, flat.JOINT, flat.FLAT, flat.PAGE),
+)
 _SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
-    **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", "")},
+    **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", ""), "plane": ("ippiipppp", "")},
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -270,6 +275,28 @@ class Kernel:
             result[:, top : top + each] = part
             counts[1] += counts[0]
         return result, tuple(counts[1].tolist())
+
+    def plane(
+        self, tables: flat.FlatTables, page: Rows, rows: range, out: npt.NDArray[Any]
+    ) -> tuple[int, int, int]:
+        """Draw rows of a picture of a `PAGE` row into ``out``, colours (rows, width, 3 or 4) float32, or
+        owners (rows, width) int32. Counts are of pairs of points and objects, of pixels of which all samples
+        were taken, and of those that were asked one by one. Raises `ProgramError` where a colour is none.
+        """
+        owners = out.dtype == np.int32
+        assert out.flags.c_contiguous
+        assert out.shape[:2] == (len(rows), int(page["width"]))
+        assert (out.ndim == 2) == owners == (int(page["samples"]) == flat.WAYS.index("owners"))
+        assert owners or (out.dtype == np.float32 and out.shape[2] == int(page["channels"]))
+        scratch = np.empty(64 * (2 + int(tables.scene["objects"]) + int(tables.scene["groups"])), np.uint8)
+        counts = np.zeros(4, np.int64)
+        places = (None, out.ctypes.data) if owners else (out.ctypes.data, None)
+        given = tables.scene.ctypes.data, page.ctypes.data, rows.start, len(rows)
+        self._library.plane(self.variant, *given, *places, counts.ctypes.data, scratch.ctypes.data)
+        pairs, refined, met, wrong = counts.tolist()
+        if wrong:
+            raise ProgramError("a damaged program: numbers that the network cannot draw with")
+        return pairs, refined, met
 
 
 def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:

@@ -387,7 +387,38 @@ def stage_rows(stage: Stage, gap: float, glowing: bool) -> tuple[Rows, Rows]:
     return result, lamps
 
 
-class Tables:
+class Held:
+    """Arrays that tables point to."""
+
+    def __init__(self) -> None:
+        self._kept: list[Any] = []
+
+    def held(self, array: npt.NDArray[Any]) -> int:
+        """The address of an array that is kept; raises `ProgramError` where a number of it is none."""
+        if not finite(array):
+            raise ProgramError("numbers that the network cannot draw with")
+        self._kept.append(np.ascontiguousarray(array))
+        return int(self._kept[-1].ctypes.data)
+
+
+def texture_row(tables: Held, row: Rows, paint: Paint, texture: Any, xp: Any) -> None:
+    """Fill a row of a paint's texture, whose arrays tables keep."""
+    row["place"] = np.array(texture.place.rows).reshape(-1)
+    if isinstance(paint.element, Gradient):
+        stops = paint.element.stops
+        row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR
+        row["stops"], row["data"] = len(stops), tables.held(np.array(stops, np.float32))
+    else:
+        row["kind"] = PICTURE if texture.lattice is None else SPACE
+        row["high"], row["wide"] = texture.sides
+        row["data"] = tables.held(np.asarray(xp.to_numpy(texture.texels)))
+    steps = np.zeros((len(paint.steps), 4), np.float32)
+    for step, (name, *numbers) in zip(steps, paint.steps, strict=True):
+        step[: 1 + len(numbers)] = list(COLOUR_STEPS).index(name), *numbers
+    row["steps"], row["step"] = len(steps), tables.held(steps)
+
+
+class Tables(Held):
     """What the kernel takes of a scene; keeps the arrays that the `SCENE` row points to.
 
     Of rows of vectors (N, 64) and tokens (N,), ``brought`` and ``paints`` are elements and textures, None
@@ -411,7 +442,7 @@ class Tables:
         self.network, self.groups = network, groups
         self.objects = read_objects(vectors, network.layout, groups, widths, reach)
         rows = self.objects.rows
-        self._kept: list[Any] = []  # what tables point to
+        super().__init__()
         self.detail = np.zeros(count, np.float32)  # texels that a way of a world unit may cross, or 0
         self.edged = False  # whether a decoder shows edges, which rays may clip
         with network.xp.inference():
@@ -429,19 +460,12 @@ class Tables:
         hues, sigma = self.looks.hues, self.looks.sigma
         coloured = bool(kinds.any()) and np.ptp(register[hues - 3 : hues, kinds], 1).max() > 0
         mixed = bool(kinds.any()), bool(kinds.any() and not kinds.all()), hues, sigma is None, coloured
-        tables = map(self._held, (rows, self.objects.steps, self.decoders, cells, textures))
+        tables = map(self.held, (rows, self.objects.steps, self.decoders, cells, textures))
         self.scene = np.array((*sizes, *mixed, sigma or 0.0, reach, *tables), SCENE)
-
-    def _held(self, array: npt.NDArray[Any]) -> int:
-        """The address of an array that is kept; raises `ProgramError` where a number of it is none."""
-        if not finite(array):
-            raise ProgramError("numbers that the network cannot draw with")
-        self._kept.append(np.ascontiguousarray(array))
-        return int(self._kept[-1].ctypes.data)
 
     def _textures(self, paints: Sequence[Paint | None], frames: npt.NDArray[np.float32], draws: Mask) -> Rows:
         """Rows of textures of objects that draw; the others leave colours as they are."""
-        network, kinds = self.network, list(COLOUR_STEPS)
+        network = self.network
         worn = [i for i, paint in enumerate(paints) if paint is not None and draws[i]]
         result = np.zeros(len(worn), TEXTURE)
         self.objects.rows["texture"][worn] = np.arange(len(worn))
@@ -449,20 +473,8 @@ class Tables:
             paint = paints[i]
             assert paint is not None
             texture: Any = texture_of(network.xp, paint, frames[i], network.codes, light=True)
-            row["place"] = np.array(texture.place.rows).reshape(-1)
             self.detail[i] = texture.detail / self.objects.rows["scale"][i]
-            if isinstance(paint.element, Gradient):
-                stops = paint.element.stops
-                row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR
-                row["stops"], row["data"] = len(stops), self._held(np.array(stops, np.float32))
-            else:
-                row["kind"] = PICTURE if texture.lattice is None else SPACE
-                row["high"], row["wide"] = texture.sides
-                row["data"] = self._held(np.asarray(network.xp.to_numpy(texture.texels)))
-            steps = np.zeros((len(paint.steps), 4), np.float32)
-            for step, (name, *numbers) in zip(steps, paint.steps, strict=True):
-                step[: 1 + len(numbers)] = kinds.index(name), *numbers
-            row["steps"], row["step"] = len(steps), self._held(steps)
+            texture_row(self, row, paint, texture, network.xp)
         return result
 
     def _decoders(self, codes: npt.NDArray[np.float32], brought: Sequence[Element | None]) -> Rows:
@@ -477,7 +489,7 @@ class Tables:
             if isinstance(key, Element):
                 shape = grid_shape(key, xp, network.codes, key in grown)
                 row["kind"], row["width"] = GROWN if key in grown else GRID, shape.side
-                row["data"] = self._held(np.asarray(xp.to_numpy(shape.nodes)))
+                row["data"] = self.held(np.asarray(xp.to_numpy(shape.nodes)))
                 sides.append(element_box(key))
                 continue
             decoder: Any = network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
@@ -489,7 +501,7 @@ class Tables:
                 _norms(row, decoder, xp)
             else:
                 row["kind"], row["width"] = SILU, len(decoder[0][1])
-                row["data"] = self._held(_layers(decoder, xp))
+                row["data"] = self.held(_layers(decoder, xp))
         rows["decoder"] = [number[key] for key in keys]
         box = np.array(sides).reshape(-1, 2, 3)[rows["decoder"]]
         # a small box, where an affine map leads to the leaf

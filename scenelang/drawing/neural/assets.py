@@ -93,6 +93,14 @@ class GridShape(Lattice):
         ]
         return Slopes(np.stack(more), 1.0)
 
+    def steepest(self) -> float:
+        """How fast the distance in the plane changes at most; infinite for grids that end inside."""
+        grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(self.side, self.side)
+        if min(grid[[0, -1]].min(), grid[:, [0, -1]].min()) < 0:
+            return np.inf
+        most = [abs(np.diff(grid, axis=axis)).max() * self.half for axis in (0, 1)]
+        return max(1.0, float(np.hypot(*most)))
+
     def field(self, q: Array, gradient: bool) -> Array:
         """Distances (1, M), or these with their change over a cell (1 + d, M), which hides edges."""
         rows = [self.distance(q)[None], *([self._change(self.distance, q)] if gradient else [])]
@@ -126,6 +134,9 @@ class GrownShape(GridShape):
     def slopes(self) -> Slopes:
         """Infinite bounds: nothing is proved of where guesses end."""
         return Slopes(np.full((len(RADII), CELLS, CELLS), np.inf), np.inf)
+
+    def steepest(self) -> float:
+        return np.inf
 
     def distance(self, q: Array) -> Array:
         xp, inside = self.xp, q.clip(-1.0, 1.0)

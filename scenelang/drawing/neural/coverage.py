@@ -117,7 +117,7 @@ def add_textures(
         if offsets is not None:
             spots = spots[:, None] + offsets
         q = field.frames.local(xp, objects[pair], spots)
-        result = field.textures[number].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
+        result = field.textures[number][1].at(q.reshape(2, -1)).reshape(3, -1, len(pair))
         xp.add(total, index, result.mean(1) * xp.take(share, some))
     s = field.network.config.state
     memory[:, s : s + 3] += total.reshape(3, groups, columns).swapaxes(0, 1)

@@ -29,6 +29,8 @@ FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 1
 CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
 ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
+CORNERS = {4: 0.36, 16: 0.54}  # pixels from the centre to the farthest of samples, a little rounded up
+NEAR = 0.85  # pixels: farther from an outline a pixel has one colour
 ROUNDED = 3  # from the index of a cut to that of the same cut with a rounded edge, see `rounded`
 _UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
 
@@ -178,7 +180,7 @@ class Field:
         albedo = self.network.object_albedo(xp.array(parts.material.copy(), self.like))
         self.colours = xp.packed((xp.array(parts.rgb.copy(), self.like) * albedo).clip(0.0, 1.0).T)
         """Colours of the objects (3 or 4, N), as registers hold them; 0 for those with a texture."""
-        self.textures: list[Texture] = []
+        self.textures: list[tuple[Paint, Texture]] = []
         self.texture = np.full(len(self.paints), NO_TEXTURE)  # Index of each object's texture (N,)
         known: dict[tuple[Paint, bytes], int] = {}
         for i, paint in enumerate(self.paints):
@@ -186,7 +188,7 @@ class Field:
                 continue
             self.texture[i] = known.setdefault((paint, parts.texture[i].tobytes()), len(known))
             if len(known) > len(self.textures):
-                self.textures.append(texture_of(xp, paint, parts.texture[i], self.like, light=False))
+                self.textures.append((paint, texture_of(xp, paint, parts.texture[i], self.like, light=False)))
             self.colours[:, i] = 0.0
         if self.clear:
             opacity = xp.array(self.opacity, self.like)
@@ -215,6 +217,10 @@ class Field:
     def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
         """Cells of objects, which come last, on the host; with gates that are open if asked for."""
         return Cell(*(part.take(self._kinds[objects] + self._opened * opened, -1) for part in self._host))
+
+    def every_cell(self) -> Cell:
+        """Cells of all objects and, behind these, groups, which come last, on the host."""
+        return Cell(*(part.take(self._kinds, -1) for part in self._host))
 
     def joins(self) -> Cell:
         """Cells of all groups, which come last, on the host."""

@@ -120,6 +120,18 @@ class Frames:
         half = self._slope * radius + self._more
         return self._centre - half, self._centre + half
 
+    def steps(self, dtype: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of all maps (kind 0) and turns (1) that move something, objects in turn, and how many each has
+        (N,).
+        """
+        rows = np.zeros((self.numbers.shape[1], len(self._stages)), dtype)
+        there = np.stack([stage.moves for stage in self._stages], 1)
+        for at, stage in enumerate(self._stages):
+            numbers = self.numbers[stage.numbers]
+            rows["kind"][:, at], rows["number"][:, at, : len(numbers)] = len(numbers) == STRENGTHS, numbers.T
+            rows["steep"][:, at], rows["rate"][:, at] = stage.steep, stage.rate
+        return rows[there], there.sum(1).astype(np.int32)
+
     def local(self, xp: Arrays, objects: np.ndarray, p: Array) -> Array:
         """Leaf coordinates (2, ..., P) of world points (2, ..., P), a column for each of the objects (P,)."""
         wide = bool(self.wild[objects].any())

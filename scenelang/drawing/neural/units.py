@@ -82,8 +82,8 @@ class LeafUnits:
         self.parts = [slice(*pair) for pair in pairwise(ends)]
         """Lines of the notch, of each unit, and inside."""
         parts = [every[:, group] for group in GROUPS]
-        self._steep = sum(np.linalg.norm(part, axis=1) for part in parts)  # of each line
-        self._whole = [float(sum(np.linalg.norm(part[at], 2) for part in parts)) for at in self.parts]
+        self.steep = sum(np.linalg.norm(part, axis=1) for part in parts)  # of each line
+        self.whole = [float(sum(np.linalg.norm(part[at], 2) for part in parts)) for at in self.parts]
 
     def _levels(self, xp: Arrays, q: Array, w: Array, b: Array) -> Array:
         return xp.dense(features(xp, q, self.layers.features), w, b)
@@ -104,9 +104,9 @@ class LeafUnits:
         *outer, inner = self.parts
         radius = np.minimum(radius, FARTHEST)  # of an infinite one no share is a number
         levels = self._levels(NUMPY, q, self._w, self._b)
-        more = self._steep[:, None] * radius
+        more = self.steep[:, None] * radius
         low, middle, high = [], [], []
-        for part, whole in zip(outer, self._whole, strict=False):
+        for part, whole in zip(outer, self.whole, strict=False):
             ends = (levels[part] + change * more[part] for change in (-1, 0, 1))
             least, own, most = (NUMPY.length([*np.maximum(end, 0.0)]) for end in ends)
             middle.append(own)
