@@ -15,7 +15,8 @@
     void cones_##v(const Scene *, int64_t, const float *, float, const float *, const float *, const float *, const float *, \
                    float *, int64_t *, void *); \
     void shade_##v(const Scene *, const Stage *, int64_t, int64_t, const float *, float *, float *, int64_t *, void *); \
-    void plane_##v(const Flat *, const Page *, int32_t, int32_t, float *, int32_t *, int64_t *, void *);
+    void plane_##v(const Flat *, const Page *, int32_t, int32_t, float *, int32_t *, int64_t *, void *); \
+    void states_##v(const Flat *, int64_t, const float *, float, float *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -73,4 +74,7 @@ OUT void shade(int32_t variant, const Scene *s, const Stage *stage, int64_t n, i
 OUT void plane(int32_t variant, const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t *counts,
                void *memory) {
     PICK(plane, s, g, top, rows, out, owner, counts, memory);
+}
+OUT void states(int32_t variant, const Flat *s, int64_t n, const float *p, float room, float *state, void *memory) {
+    PICK(states, s, n, p, room, state, memory);
 }

@@ -257,11 +257,11 @@ void NAME(shade)(const Scene *s, const Stage *stage, int64_t n, int64_t across, 
 }
 // Rows of a picture of the plane from `top` on: premultiplied colours (rows, width, 4), or over a background (rows, width, 3),
 // or, unless null, the owners of pixels instead. Counts are of pairs of points and objects, of pixels of which all samples
-// were taken, of those that were asked one by one, and of numbers that are none. Scratch is 64 bytes for each object and group.
-void NAME(plane)(const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t counts[4], void *scratch) {
+// were taken, and of those that were asked one by one. Scratch is 64 bytes for each object and group.
+void NAME(plane)(const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t counts[3], void *scratch) {
     Target t = {s, g, out, owner, 0, top, g->width, top + rows};
     Entry *entries = aligned(scratch);
-    Work2 w = {.macro = entries, .tile = entries + s->objects, .turn = (Turn *)(entries + 2 * (size_t)s->objects)};
+    Drawn w = {.macro = entries, .tile = entries + s->objects, .turn = (Turn *)(entries + 2 * (size_t)s->objects)};
     w.row = (int32_t *)(w.turn + s->objects + s->groups);
     for (int y = top; y < top + rows; y += 64) {
         double low[2], high[2];
@@ -276,5 +276,25 @@ void NAME(plane)(const Flat *s, const Page *g, int32_t top, int32_t rows, float 
             macro(&t, w.macro, count, x, y, &w);
         }
     }
-    counts[0] = w.pairs; counts[1] = w.refined; counts[2] = w.met; counts[3] = w.wrong;
+    counts[0] = w.pairs; counts[1] = w.refined; counts[2] = w.met;
+}
+// States (n) of the fold at points (2, n) of the plane, right within `room` world units around them.
+void NAME(states)(const Flat *s, int64_t n, const float *p, float room, float *state, void *scratch) {
+    Entry *entries = aligned(scratch);
+    int64_t pairs = 0;
+    for (int64_t i = 0; i < n; i += W) {
+        P q;
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < n ? i + k : n - 1;
+            q.x[k] = p[j]; q.y[k] = p[n + j];
+            for (int e = 0; e < 2; e++) {
+                double at = p[e * n + j];
+                low[e] = fmin(low[e], at - room); high[e] = fmax(high[e], at + room);
+            }
+        }
+        int count = 0;
+        for (int k = 0; k < s->objects; k++) if (meets(s->shape + k, low, high)) entries[count++] = (Entry){k, ALL_CELLS, 0};
+        store(state, n, i, fold_plain(s, entries, count, 0, q, 0, 0, &pairs).d);
+    }
 }

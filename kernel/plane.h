@@ -28,7 +28,7 @@ typedef struct {
 } Looked;
 typedef struct { int32_t object; uint16_t kept, open; } Entry;  // an object at 16 cells: which it may change, or hides all in
 typedef struct { int32_t entry, level; uint16_t closed, wide; } Turn;  // what came of an entry, or (-1) of a group's end
-typedef struct { Entry *macro, *tile; int32_t *row; Turn *turn; int64_t pairs, refined, met, wrong; } Work2;
+typedef struct { Entry *macro, *tile; int32_t *row; Turn *turn; int64_t pairs, refined, met; } Drawn;  // lists, and counts
 
 IN F above(F a) { return max2(a, all(0)); }
 IN F length2(F x, F y) { return root(x * x + y * y); }
@@ -482,24 +482,23 @@ static ONCE uint32_t proved(const Flat *s, Entry *met, int count, const float *x
     return flat;
 }
 typedef struct { const Flat *s; const Page *g; float *out; int32_t *owner; int left, top, right, bottom; } Target;
-IN void put_pixel(const Target *t, int x, int y, const float *c, Work2 *w) {
+IN void put_pixel(const Target *t, int x, int y, const float *c) {
     int64_t at = (int64_t)(y - t->top) * t->g->width + x;
     const Page *g = t->g;
     float *to = t->out + at * g->channels;
-    for (int k = 0; k < 4; k++) w->wrong += !(c[k] - c[k] == 0);
     for (int k = 0; k < g->channels; k++) {
         float v = g->channels == 3 ? c[k] + (1 - c[3]) * g->background[k] : c[k];
         to[k] = v < 0 ? 0 : v > 1 ? 1 : v;
     }
 }
-static void fill(const Target *t, int x, int y, int side, const float *c, Work2 *w) {
+static void fill(const Target *t, int x, int y, int side, const float *c) {
     int right = x + side < t->right ? x + side : t->right, bottom = y + side < t->bottom ? y + side : t->bottom;
     if (t->owner) {
         for (int j = y; j < bottom; j++)
             memset(t->owner + (int64_t)(j - t->top) * t->g->width + x, 0, sizeof(int32_t) * (size_t)(right - x));
         return;
     }
-    put_pixel(t, x, y, c, w);
+    put_pixel(t, x, y, c);
     int channels = t->g->channels;
     float *first = t->out + ((int64_t)(y - t->top) * t->g->width + x) * channels;
     for (int i = 1; i < right - x; i++) for (int k = 0; k < channels; k++) first[i * channels + k] = first[k];
@@ -507,7 +506,7 @@ static void fill(const Target *t, int x, int y, int side, const float *c, Work2 
         memcpy(first + (int64_t)j * t->g->width * channels, first, sizeof(float) * channels * (size_t)(right - x));
 }
 // The pixels of a block.
-static void block(const Target *t, const Entry *met, int count, int bit, int x, int y, Work2 *w) {
+static void block(const Target *t, const Entry *met, int count, int bit, int x, int y, Drawn *w) {
     const Flat *s = t->s;
     const Page *g = t->g;
     float px[16], py[16], result[16][4];
@@ -553,7 +552,7 @@ static void block(const Target *t, const Entry *met, int count, int bit, int x, 
             if (near[k]) refined[many++] = base + k;
             else {
                 float one[4] = {c[0][k], c[1][k], c[2][k], c[3][k]};
-                put_pixel(t, x + (base + k) % 4, y + (base + k) / 4, one, w);
+                put_pixel(t, x + (base + k) % 4, y + (base + k) / 4, one);
             }
         }
     }
@@ -573,7 +572,7 @@ static void block(const Target *t, const Entry *met, int count, int bit, int x, 
     }
     for (int i = 0; i < many; i++) {
         for (int k = 0; k < 4; k++) result[i][k] /= (float)g->count;
-        put_pixel(t, x + refined[i] % 4, y + refined[i] / 4, result[i], w);
+        put_pixel(t, x + refined[i] % 4, y + refined[i] / 4, result[i]);
     }
 }
 // The 16 cells of a side from a corner on.
@@ -590,29 +589,29 @@ IN uint32_t cells_of(const Target *t, int x, int y, int side, float *mx, float *
     return some;
 }
 IN float around(const Page *g, int side) { return (float)(side * g->step * 0.70710678) + 2e-6f * (1 + g->extent); }
-static void tile(const Target *t, Entry *met, int count, int x, int y, Work2 *w) {
+static void tile(const Target *t, Entry *met, int count, int x, int y, Drawn *w) {
     float mx[16], my[16], colour[16][4] = {{0}};
-    if (!count) { fill(t, x, y, 16, colour[0], w); return; }
+    if (!count) { fill(t, x, y, 16, colour[0]); return; }
     uint32_t some = cells_of(t, x, y, 4, mx, my);
     for (int i = 0; i < count; i++) { met[i].kept = some; met[i].open = met[i].open ? ALL_CELLS : 0; }
     uint32_t flat = proved(t->s, met, count, mx, my, around(t->g, 4), w->turn, colour, &w->pairs);
     for (int b = 0; b < 16; b++) {
         if (!(some >> b & 1)) continue;
         int left = x + 4 * (b % 4), top = y + 4 * (b / 4);
-        if (flat >> b & 1 && !t->owner) fill(t, left, top, 4, colour[b], w);
+        if (flat >> b & 1 && !t->owner) fill(t, left, top, 4, colour[b]);
         else block(t, met, count, b, left, top, w);
     }
 }
-static void macro(const Target *t, Entry *met, int count, int x, int y, Work2 *w) {
+static void macro(const Target *t, Entry *met, int count, int x, int y, Drawn *w) {
     float mx[16], my[16], colour[16][4] = {{0}};
-    if (!count) { fill(t, x, y, 64, colour[0], w); return; }
+    if (!count) { fill(t, x, y, 64, colour[0]); return; }
     uint32_t some = cells_of(t, x, y, 16, mx, my);
     for (int i = 0; i < count; i++) { met[i].kept = some; met[i].open = 0; }
     uint32_t flat = proved(t->s, met, count, mx, my, around(t->g, 16), w->turn, colour, &w->pairs);
     for (int b = 0; b < 16; b++) {
         if (!(some >> b & 1)) continue;
         int left = x + 16 * (b % 4), top = y + 16 * (b / 4), n = 0;
-        if (flat >> b & 1 && !t->owner) { fill(t, left, top, 16, colour[b], w); continue; }
+        if (flat >> b & 1 && !t->owner) { fill(t, left, top, 16, colour[b]); continue; }
         for (int i = 0; i < count; i++)
             if (met[i].kept >> b & 1) w->tile[n++] = (Entry){met[i].object, 0, met[i].open >> b & 1};
         tile(t, w->tile, n, left, top, w);

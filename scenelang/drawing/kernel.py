@@ -18,7 +18,6 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.how import RenderError, check_time
 from scenelang.drawing.neural import tables as flat
@@ -47,6 +46,7 @@ _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
     **{"field": ("iplppppppp", "l"), "own": ("iplppppp", ""), "rays": ("ipllppppfiiipppppplp", "l")},
     **{"cones": ("iplpfppppppp", ""), "shade": ("ippllppppp", ""), "plane": ("ippiipppp", "")},
+    "states": ("iplpfpp", ""),
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -281,7 +281,7 @@ class Kernel:
     ) -> tuple[int, int, int]:
         """Draw rows of a picture of a `PAGE` row into ``out``, colours (rows, width, 3 or 4) float32, or
         owners (rows, width) int32. Counts are of pairs of points and objects, of pixels of which all samples
-        were taken, and of those that were asked one by one. Raises `ProgramError` where a colour is none.
+        were taken, and of those that were asked one by one.
         """
         owners = out.dtype == np.int32
         assert out.flags.c_contiguous
@@ -289,14 +289,22 @@ class Kernel:
         assert (out.ndim == 2) == owners == (int(page["samples"]) == flat.WAYS.index("owners"))
         assert owners or (out.dtype == np.float32 and out.shape[2] == int(page["channels"]))
         scratch = np.empty(64 * (2 + int(tables.scene["objects"]) + int(tables.scene["groups"])), np.uint8)
-        counts = np.zeros(4, np.int64)
+        counts = np.zeros(3, np.int64)
         places = (None, out.ctypes.data) if owners else (out.ctypes.data, None)
         given = tables.scene.ctypes.data, page.ctypes.data, rows.start, len(rows)
         self._library.plane(self.variant, *given, *places, counts.ctypes.data, scratch.ctypes.data)
-        pairs, refined, met, wrong = counts.tolist()
-        if wrong:
-            raise ProgramError("a damaged program: numbers that the network cannot draw with")
+        pairs, refined, met = counts.tolist()
         return pairs, refined, met
+
+    def states(self, tables: flat.FlatTables, p: npt.NDArray[Any], room: float = 0.0) -> Floats:
+        """States (M,) of the plane's fold at points (2, M), right within ``room`` world units around them."""
+        p = np.ascontiguousarray(p, np.float32)
+        result = np.empty(p.shape[1], np.float32)
+        assert p.shape == (2, len(result))
+        scratch = np.empty(64 * (2 + int(tables.scene["objects"])), np.uint8)
+        given = tables.scene.ctypes.data, len(result), p.ctypes.data, room
+        self._library.states(self.variant, *given, result.ctypes.data, scratch.ctypes.data)
+        return result
 
 
 def _portions(tables: Tables, count: int, until_s: float) -> Iterator[slice]:
@@ -345,6 +353,6 @@ def there_is_a_kernel() -> bool:
     try:
         load_kernel()
     except KernelError as error:
-        warnings.warn(f"{error}; torch draws solids in its place, slowly, and no skies", stacklevel=2)
+        warnings.warn(f"{error}; torch draws in its place, slowly, and no skies", stacklevel=2)
         return False
     return True

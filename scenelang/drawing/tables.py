@@ -48,7 +48,7 @@ FORMULAS = ("sphere", "torus", "box", "cylinder", "cone", "capsule", "octahedron
 PICTURE, SPACE, LINEAR, RADIAL = range(4)  # of textures
 
 
-def _dtype(*kinds: str) -> np.dtype[Any]:
+def dtype_of(*kinds: str) -> np.dtype[Any]:
     """The dtype of a struct: of each kind, f4, i4 or u8 for an address, members, arrays with their sides."""
     fields: list[Any] = []
     for kind, *members in map(str.split, kinds):
@@ -58,23 +58,23 @@ def _dtype(*kinds: str) -> np.dtype[Any]:
     return np.dtype(fields, align=True)
 
 
-OBJECT = _dtype(
+OBJECT = dtype_of(
     "f4 map[12] scale reach moved radius ball rate centre[3] extent low[3] high[3] amount frequency",
     "f4 first wall last late look[12]",
     "i4 flags ends decoder step steps texture depth path[15]",
 )
-STEP = _dtype("i4 kind", "f4 twirl rate map[12]")
-DECODER = _dtype("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
-CELL = _dtype("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
-TEXTURE = _dtype("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
-PIECE = _dtype("i4 ray", "f4 begin end before sigma")
-SCENE = _dtype(
+STEP = dtype_of("i4 kind", "f4 twirl rate map[12]")
+DECODER = dtype_of("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
+CELL = dtype_of("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
+TEXTURE = dtype_of("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
+PIECE = dtype_of("i4 ray", "f4 begin end before sigma")
+SCENE = dtype_of(
     "i4 objects groups deepest rows switched clipping media mixed hues dense coloured",
     "f4 sigma reach",
     "u8 object step decoder cell texture",
 )
-LAMP = _dtype("f4 at[3] power[3]")
-STAGE = _dtype(
+LAMP = dtype_of("f4 at[3] power[3]")
+STAGE = dtype_of(
     "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift",
     "i4 lamps grounded transparent glow",
     "u8 lamp",

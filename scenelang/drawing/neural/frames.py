@@ -110,11 +110,6 @@ class Frames:
         self._more = np.where(outer, [across * moved, along * moved], [zero, zero])
         self.wild = (largest > TAME) | ~((self.scale > 1 / TAME) & (self.scale < TAME))
 
-    @property
-    def growth(self) -> Floats:
-        """Most leaf units (N,) by which a point moves in each object's leaf as it moves by a world unit."""
-        return self.stretch / self.scale
-
     def boxes(self, radius: Floats) -> tuple[Floats, Floats]:
         """Corners (2, N) of world boxes outside which leaf coordinates are longer than radii (N,)."""
         half = self._slope * radius + self._more

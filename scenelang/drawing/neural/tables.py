@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from typing import Any, Final
+from typing import Final
 
 import numpy as np
 
@@ -12,7 +12,7 @@ from scenelang.compiler.program import ProgramError
 from scenelang.drawing.how import Samples
 from scenelang.drawing.image import sample_places
 from scenelang.drawing.neural.assets import GridShape, GrownShape
-from scenelang.drawing.neural.field import CORNERS, NEAR, Field
+from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.outlines import table_of
 from scenelang.drawing.neural.units import FEATURES, LeafUnits
 from scenelang.drawing.tables import (
@@ -25,31 +25,33 @@ from scenelang.drawing.tables import (
     UNITS,
     Held,
     Rows,
-    _dtype,
+    dtype_of,
     texture_row,
 )
 
-STEP: Final = _dtype("i4 kind", "f4 steep rate number[6]")
-SHAPE: Final = _dtype(
+STEP: Final = dtype_of("i4 kind", "f4 steep rate number[6]")
+SHAPE: Final = dtype_of(
     "f4 scale reach calm low[2] high[2] first wall last colour[4]",
     "i4 flags leaf step steps texture depth path[15]",
 )
-LEAF: Final = _dtype(
+LEAF: Final = dtype_of(
     "i4 kind units size[9] inner features feature[10] width",
     "f4 radius slope line[27,11] steep[27] whole[9]",
     "u8 data first near",
 )
-JOINT: Final = _dtype("i4 flags", "f4 own[3] past[3] bias[3] candidate bump width stretch")
-FLAT: Final = _dtype(
+JOINT: Final = dtype_of("i4 flags", "f4 own[3] past[3] bias[3] candidate bump width stretch")
+FLAT: Final = dtype_of(
     "i4 objects groups deepest clear traced rounded",
     "f4 slope empty over_unit",
     "u8 shape step leaf joint texture",
 )
-PAGE: Final = _dtype(
+PAGE: Final = dtype_of(
     "f8 west north step",
     "i4 width height samples count channels",
     "f4 px corner near extent background[3] place[32]",
 )
+CORNERS: Final = {4: 0.36, 16: 0.54}  # pixels from the centre to the farthest of samples, a little rounded up
+NEAR: Final = 0.85  # pixels: farther from an outline a pixel has one colour
 JOINS_UNION, DRAWN, WILD, SMOOTHS, CUTS = (1 << bit for bit in range(5))  # flags of joints and shapes
 OUTLINE: Final = 5  # a kind of decoder
 WAYS: Final = ("adaptive", "four", "one", "owners")
@@ -89,14 +91,20 @@ class FlatTables(Held):
         shapes["flags"] = sum(flag * mask.astype(np.int32) for flag, mask in flags)
         leaves, shapes["leaf"] = self._leaves(field)
         textures = np.zeros(len(field.textures), TEXTURE)
-        for row, (paint, texture) in zip(textures, field.textures, strict=True):
+        for at, (row, texture) in enumerate(zip(textures, field.textures, strict=True)):
+            paint = field.paints[int(np.argmax(field.texture == at))]
+            assert paint is not None
             texture_row(self, row, paint, texture, field.xp)
         joints = np.zeros(count + len(groups.joins), JOINT)
-        cells = field.every_cell()
-        if cells.lines.shape[:2] != (3, 2):
+        cells = field.cells
+        if cells.lines.shape[1:] != (3, 2):
             raise ProgramError("a cell of other lines than the kernel knows")
-        joints["own"], joints["past"], joints["bias"] = cells.lines[:, 0].T, cells.lines[:, 1].T, cells.bias.T
-        joints["candidate"], joints["bump"] = cells.candidate[0, 0], cells.bump[0]
+        joints["own"], joints["past"] = cells.lines.transpose(2, 0, 1)
+        joints["bias"], joints["candidate"], joints["bump"] = (
+            cells.bias,
+            cells.candidate[:, 0, 0],
+            cells.bump[:, 0, 0],
+        )
         joints["width"], joints["stretch"] = field.widths, field.stretch
         kinds = ((JOINS_UNION, field.operators == UNION), (SMOOTHS, field.operators == SMOOTH))
         for flag, mask in (*kinds, (CUTS, field.operators > SMOOTH)):
@@ -140,6 +148,14 @@ class FlatTables(Held):
         row["first"], row["near"] = (self.held(part.astype(np.int32)) for part in (table.first, table.near))
 
 
+def tables_of(field: Field) -> FlatTables:
+    """The tables of a field, made once."""
+    if field.tables is None:
+        field.tables = FlatTables(field)
+    tables: FlatTables = field.tables
+    return tables
+
+
 def _units(row: Rows, shape: LeafUnits) -> None:
     """Fill a row of norm units; raises `ProgramError` for more than a row holds."""
     layers, xp = shape.layers, shape.xp
@@ -152,7 +168,7 @@ def _units(row: Rows, shape: LeafUnits) -> None:
     row["radius"] = np.asarray(xp.to_numpy(layers.radius))
     row["line"][: len(b), : w.shape[1]], row["line"][: len(b), FEATURES - 1] = w, b
     row["steep"][: len(b)] = shape.steep
-    row["whole"][: 1 + len(layers.units)] = shape.whole[:-1]
+    row["whole"][: 1 + len(layers.units)] = shape.whole
 
 
 def page_row(
