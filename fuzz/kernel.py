@@ -23,6 +23,8 @@ from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.closed import field_of
 from scenelang.drawing.kernel import Exchange, Kernel
+from scenelang.drawing.neural.field import Field
+from scenelang.drawing.neural.tables import WAYS, page_row, tables_of
 from scenelang.drawing.solid.march import MARCH_SETTINGS
 from scenelang.drawing.tables import AROUND, NODE, Tables, stage_rows
 from scenelang.language.evaluation import load
@@ -61,11 +63,14 @@ def mutated(program: Program, seed: int) -> Program:
 
 @np.errstate(all="ignore")
 def ask(kernel: Kernel, program: Program, seed: int) -> None:
-    """Ask for the field of a Program anywhere, for rays, cones and light; raises `ProgramError` where it
-    holds no scene.
+    """Ask for the field of a Program anywhere, rays, cones and light, or in the plane for pictures; raises
+    `ProgramError` where it holds no scene.
     """
     rng = np.random.default_rng(seed)
     given = (program.vectors, program.tokens, program.brought(), program.paints())
+    if program.stage is None:
+        ask_plane(kernel, Field(field_of(program, seed % 3 == 0), *given), rng)  # type: ignore[arg-type]
+        return
     tables = Tables(field_of(program, seed % 3 == 0), *given, reach=seed % 2 * 0.3)  # type: ignore[arg-type]
     p = (rng.normal(size=(3, POINTS)) * 10.0 ** rng.integers(-2, 3, POINTS)).astype(np.float32)
     some = rng.integers(0, POINTS, 3)
@@ -142,15 +147,32 @@ def light_up(
     kernel.crossings(tables, objects, p, way, abs(p[1]), np.full(p.shape[1], 0.1))
 
 
+def ask_plane(kernel: Kernel, field: Field, rng: np.random.Generator) -> None:
+    """Ask for a picture, owners and states of a field of the plane; raises `ProgramError`."""
+    tables = tables_of(field)
+    canvas = int(rng.integers(1, 150)), int(rng.integers(1, 100))
+    count, samples = int(rng.choice([4, 16])), str(rng.choice(WAYS))
+    behind = rng.random(3) if rng.random() < 0.5 and samples != "owners" else None
+    owners = samples == "owners"
+    sides = canvas[::-1] if owners else (*canvas[::-1], 4 if behind is None else 3)
+    out = np.empty(sides, np.int32 if owners else np.float32)
+    kernel.plane(tables, page_row(canvas, count, samples, behind), range(canvas[1]), out)
+    if owners:
+        assert ((out >= 0) & (out <= len(field.tokens))).all()
+    p = (rng.normal(size=(2, POINTS)) * 10.0 ** rng.integers(-2, 3, POINTS)).astype(np.float32)
+    p[rng.integers(0, 2, 3), rng.integers(0, POINTS, 3)] = (np.inf, np.nan, 3e38)
+    kernel.states(tables, p, float(rng.choice([0.0, 0.1, 9.0])))
+
+
 def programs() -> list[Program]:
-    """Programs of all scenes of solids."""
+    """Programs of all scenes."""
     found = []
     for path in sorted([*ROOT.glob("examples/*.nsg"), *ROOT.glob("tests/conformance/cases/*.nsg")]):
         try:
             program = compile_scene(load(path))
         except SceneError:
             continue
-        if program.stage is not None and len(program):
+        if len(program):
             found.append(program)
     return found
 

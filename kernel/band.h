@@ -1,7 +1,7 @@
 // Bands of a picture: rays through pixels' centres, and through more places where these differ from their neighbours.
 #pragma once
 #include "mist.h"
-enum { SIDE = 16, CLOSE = 8 };  // pixels of tiles whose rays, and whose further samples, are followed together
+enum { TILE = 16, CLOSE = 8 };  // pixels of tiles whose rays, and whose further samples, are followed together
 
 // Set the way of a ray through a place of the picture, in pixels from its upper left corner.
 static void ray_to(const Stage *e, double x, double y, Rows *way, int at) {
@@ -78,10 +78,10 @@ static void centres(Job *j, int top, int bottom, int first, int last, float *pic
     size_t plane = (size_t)(bottom - top) * (size_t)e->width, at[BEAM];
     Beam b;
     j->means = e->count > 0;
-    for (int row = first; row < last; row += SIDE) for (int left = 0; left < e->width; left += SIDE) {
+    for (int row = first; row < last; row += TILE) for (int left = 0; left < e->width; left += TILE) {
         int n = 0;
-        for (int y = row; y < row + SIDE && y < last; y += 2)  // in pairs of rows, so that packets are compact
-            for (int x = left; x < left + SIDE && x < e->width; x++)
+        for (int y = row; y < row + TILE && y < last; y += 2)  // in pairs of rows, so that packets are compact
+            for (int x = left; x < left + TILE && x < e->width; x++)
                 for (int k = y; k < y + 2 && k < last; k++) {
                     ray_to(e, x + 0.5, k + 0.5, &b.way, n);
                     at[n++] = (size_t)(k - top) * (size_t)e->width + (size_t)x;

@@ -25,7 +25,9 @@
     void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *); \
     int64_t crossings_##v(const Scene *, int64_t, const int32_t *, const float *, const float *, const float *, const float *, int64_t, \
                           int32_t *, float *); \
-    void mirrored_##v(int64_t, const float *, float, const float *, const float *, const float *, const float *, const float *, float *);
+    void mirrored_##v(int64_t, const float *, float, const float *, const float *, const float *, const float *, const float *, float *); \
+    void plane_##v(const Flat *, const Page *, int32_t, int32_t, float *, int32_t *, int64_t *, void *); \
+    void states_##v(const Flat *, int64_t, const float *, float, float *, void *);
 EACH(v2)
 #if defined(__x86_64__) && !defined(ONE)
 EACH(v3)
@@ -52,10 +54,11 @@ OUT int32_t newest(void) { return 0; }
 #endif
 OUT const char *mark(void) { return MARK; }  // a digest of the sources
 // What tables.py has to agree with.
-OUT void sizes(int32_t r[9]) {
-    size_t all[11] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
-                     sizeof(Lamp), sizeof(Stage), sizeof(Node), sizeof(Around)};
-    for (int i = 0; i < 11; i++) r[i] = (int32_t)all[i];
+OUT void sizes(int32_t r[17]) {
+    size_t all[17] = {sizeof(Object), sizeof(Step), sizeof(Decoder), sizeof(Cell), sizeof(Texture), sizeof(Piece), sizeof(Scene),
+                      sizeof(Lamp), sizeof(Stage), sizeof(Node), sizeof(Around), sizeof(Shape), sizeof(FlatStep), sizeof(Leaf),
+                      sizeof(Joint), sizeof(Flat), sizeof(Page)};
+    for (int i = 0; i < 17; i++) r[i] = (int32_t)all[i];
 }
 OUT int64_t scratch(int32_t variant, const Scene *s) { return PICK(scratch, s); }
 OUT int64_t field(int32_t variant, const Scene *s, int64_t n, const float *p, const float *reach, float *distance,
@@ -111,4 +114,11 @@ OUT int64_t crossings(int32_t variant, const Scene *s, int64_t n, const int32_t 
 OUT void mirrored(int32_t variant, int64_t n, const float *at, float radius, const float *p, const float *normal, const float *rough,
                   const float *back, const float *straight, float *light) {
     PICK(mirrored, n, at, radius, p, normal, rough, back, straight, light);
+}
+OUT void plane(int32_t variant, const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t *counts,
+               void *memory) {
+    PICK(plane, s, g, top, rows, out, owner, counts, memory);
+}
+OUT void states(int32_t variant, const Flat *s, int64_t n, const float *p, float room, float *state, void *memory) {
+    PICK(states, s, n, p, room, state, memory);
 }

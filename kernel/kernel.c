@@ -1,6 +1,7 @@
 // What Python calls, for one kind of processor: `NAME` adds its name. No globals; scratch comes from the caller.
 #include "band.h"
 #include "light.h"
+#include "plane.h"
 #ifndef NAME
 #define NAME(x) x
 #endif
@@ -272,5 +273,48 @@ void NAME(exchanged)(int64_t n, const int64_t *begin, const int32_t *index, cons
         float sum[3] = {0, 0, 0};
         for (int64_t k = begin[j]; k < begin[j + 1]; k++) for (int d = 0; d < 3; d++) sum[d] += share[k] * sent[3 * index[k] + d];
         for (int d = 0; d < 3; d++) received[3 * j + d] = sum[d];
+    }
+}
+// Rows of a picture of the plane from `top` on: premultiplied colours (rows, width, 4), or over a background (rows, width, 3),
+// or, unless null, the owners of pixels instead. Counts are of pairs of points and objects, of pixels of which all samples
+// were taken, and of those that were asked one by one. Scratch is 64 bytes for each object and group.
+void NAME(plane)(const Flat *s, const Page *g, int32_t top, int32_t rows, float *out, int32_t *owner, int64_t counts[3], void *scratch) {
+    Target t = {s, g, out, owner, 0, top, g->width, top + rows};
+    Entry *entries = aligned(scratch);
+    Drawn w = {.macro = entries, .tile = entries + s->objects, .turn = (Turn *)(entries + 2 * (size_t)s->objects)};
+    w.row = (int32_t *)(w.turn + s->objects + s->groups);
+    for (int y = top; y < top + rows; y += 64) {
+        double low[2], high[2];
+        int some = 0;
+        low[0] = -INFINITY; high[0] = INFINITY;
+        high[1] = g->north - g->step * (y - 0.5) + 1e-6; low[1] = g->north - g->step * (y + 63.5) - 1e-6;
+        for (int i = 0; i < s->objects; i++) if (meets(s->shape + i, low, high)) w.row[some++] = i;
+        for (int x = 0; x < g->width; x += 64) {
+            int count = 0;
+            low[0] = g->west + g->step * (x - 0.5) - 1e-6; high[0] = g->west + g->step * (x + 63.5) + 1e-6;
+            for (int i = 0; i < some; i++) if (meets(s->shape + w.row[i], low, high)) w.macro[count++].object = w.row[i];
+            macro(&t, w.macro, count, x, y, &w);
+        }
+    }
+    counts[0] = w.pairs; counts[1] = w.refined; counts[2] = w.met;
+}
+// States (n) of the fold at points (2, n) of the plane, right within `room` world units around them.
+void NAME(states)(const Flat *s, int64_t n, const float *p, float room, float *state, void *scratch) {
+    Entry *entries = aligned(scratch);
+    int64_t pairs = 0;
+    for (int64_t i = 0; i < n; i += W) {
+        P q;
+        double low[2] = {INFINITY, INFINITY}, high[2] = {-INFINITY, -INFINITY};
+        for (int k = 0; k < W; k++) {
+            int64_t j = i + k < n ? i + k : n - 1;
+            q.x[k] = p[j]; q.y[k] = p[n + j];
+            for (int e = 0; e < 2; e++) {
+                double at = p[e * n + j];
+                low[e] = fmin(low[e], at - room); high[e] = fmax(high[e], at + room);
+            }
+        }
+        int count = 0;
+        for (int k = 0; k < s->objects; k++) if (meets(s->shape + k, low, high)) entries[count++] = (Entry){k, ALL_CELLS, 0};
+        store(state, n, i, fold_plain(s, entries, count, 0, q, 0, 0, &pairs).d);
     }
 }

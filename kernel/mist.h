@@ -6,8 +6,8 @@
 #define LONG 2.0f  // world units: longer ways are cut,
 #define STEEP 1.2f  // and those where the last node gets so much more light than the first, or other lamps,
 #define LEAST 0.04f  // if they are so large a part of what is seen,
-enum { THIRDS = 3, SPANS = 9, CUTS = SPANS * 8 + 1 };  // into these. Spans of a lamp; of as many as there may be
-#define NARROW 0.8f  // cosine: ways that a lamp sees under a larger angle are cut where it changes by spans,
+enum { THIRDS = 3, SPANS = 9, SPLITS = SPANS * 8 + 1 };  // into these. Spans of a lamp; of as many as there may be
+#define SLENDER 0.8f  // cosine: ways that a lamp sees under a larger angle are cut where it changes by spans,
 static const float SPAN[SPANS + 1] = {-BIG, -14.0f, -3.7f, -1.0f, -0.27f, 0.27f, 1.0f, 3.7f, 14.0f, BIG};  // tangents at the lamp
 #define BUSY 8.0f  // texels that a way may cross with `FEW` panels of two points each
 enum { FEW = 4, MANY = 12 };
@@ -143,7 +143,7 @@ static ONCE void scatter(Job *j, Beam *b, int first, const Pieces *pieces) {
     int64_t count = pieces->count < pieces->room ? pieces->count : pieces->room;
     for (int64_t i = 0; i < count; i++) {
         const Piece *whole = pieces->piece + i;
-        float cuts[CUTS + 1] = {whole->begin, whole->end}, to[3];
+        float cuts[SPLITS + 1] = {whole->begin, whole->end}, to[3];
         int n = 2;
         for (int d = 0; d < 3; d++) to[d] = b->way.v[d][first + whole->ray];
         for (int l = 0; l < e->lamps; l++) {  // where the light of a lamp falls unevenly
@@ -153,7 +153,7 @@ static ONCE void scatter(Job *j, Beam *b, int first, const Pieces *pieces) {
                 float p = at[d] - to[d] * whole->begin, q = at[d] - to[d] * whole->end;
                 product += p * q; one += p * p; two += q * q; middle += at[d] * to[d];
             }
-            if (product > NARROW * sqrtf(one) * sqrtf(two)) continue;
+            if (product > SLENDER * sqrtf(one) * sqrtf(two)) continue;
             for (int d = 0; d < 3; d++) aside += (at[d] - to[d] * middle) * (at[d] - to[d] * middle);
             aside = fmaxf(sqrtf(aside), e->nearest);
             for (int k = 1; k < SPANS; k++) {

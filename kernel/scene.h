@@ -77,3 +77,36 @@ typedef struct {  // light from everywhere, as scenelang/drawing/solid/around.py
     const float *about;  // places, normals and weights (7, 16) of the nodes of cells
     const float *lamp, *haze, *disc;  // places, powers and radii; light and density; places, normals, light and areas
 } Around;
+
+// The plane: rows of scenelang/drawing/tables.py's PlaneTables.
+enum { FEATURES_2D = 10, LINE_2D = 11, OUTLINE_WORDS = 64 };
+typedef struct { int32_t kind; float steep, rate, number[6]; } FlatStep;  // how far it takes points apart at most, and turns
+typedef struct {  // an object of the plane
+    float scale, reach, calm;  // as of `Object`; 1 over how much faster than 1 its distance changes at most
+    float low[2], high[2];  // a box of the world outside which it changes nothing
+    float first, wall, last, colour[4];  // of a skin; premultiplied, and opacity
+    int32_t flags, leaf, step, steps, texture, depth, path[DEEP];
+} Shape;
+typedef struct {
+    int32_t kind;
+    int32_t units, size[UNITS + 1], inner, features, feature[FEATURES_2D];  // lines of the notch, and of each unit
+    int32_t width;  // nodes along an axis of a grid, or pieces of an outline
+    float radius, slope, line[LINES][LINE_2D], steep[LINES], whole[UNITS + 1];  // bounds on how fast all these change
+    const float *data;
+    const int32_t *first, *near;  // where the list of each of an outline's cells begins, and the lists of pieces
+} Leaf;
+typedef struct { int32_t flags; float own[3], past[3], bias[3], candidate, bump, width, stretch; } Joint;  // a cell
+typedef struct {
+    int32_t objects, groups, deepest, clear, traced, rounded;
+    float slope, empty, over_unit;  // of coverage by the state, the state before the first object, world units of 1
+    const Shape *shape;
+    const FlatStep *step;
+    const Leaf *leaf;
+    const Joint *joint;  // of the objects, then of the groups
+    const Texture *texture;
+} Flat;
+typedef struct {  // a picture: its first pixel's middle and the step to the next, how to ask, and places of samples
+    double west, north, step;
+    int32_t width, height, samples, count, channels;
+    float px, corner, near, extent, background[3], place[32];
+} Page;

@@ -64,7 +64,7 @@ TARGETS: dict[str, tuple[str, ...]] = {
     "scenelang/drawing/exact/solid.py": ("tests/drawing/test_closed.py", "tests/drawing/test_solid.py"),
     "scenelang/drawing/neural/draw.py": DRAWING,
     "scenelang/drawing/neural/frames.py": DRAWING,
-    "scenelang/drawing/neural/coverage.py": DRAWING,
+    "scenelang/drawing/neural/tables.py": DRAWING,
     "scenelang/drawing/neural/field.py": (*TREES, *DRAWING),
     "scenelang/drawing/neural/network.py": DRAWING,
     "scenelang/compiler/groups.py": TREES,

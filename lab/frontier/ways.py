@@ -139,7 +139,7 @@ def _neural(name: str, side: int, threads: int, samples: Sampling = "adaptive", 
         if side:
             scene = scene.model_copy(update={"canvas": (side, side)})
         program = compile_scene(scene, model=name)
-        if choose_drawer(program, samples=samples)[0] == "torch":
+        if choose_drawer(program)[0] == "torch":
             model = open_model(name)
             return lambda: draw_program(program, model, threads=threads, samples=samples, skip=skip).image
         if skip:

@@ -148,7 +148,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
 
     Deformations are measured in the normal form; the scale of an object is each of the two stretches of its
     affine maps, and how thin it is their ratio; an opaque solid is as thick as where it is thinnest, of what
-    does not run out to a rim a wall; a view reaches from the target to the canvas's nearest edge; texels are
+    does not run out to a rim a wall, both in a view of the usual size; texels are
     counted where they are densest, of a solid at its centre. Before: STREAM. After: unchanged.
     """
     rows, trained = graph.rows(), context.manifest.trained
@@ -158,13 +158,13 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     for _, leaf, _, _, _, cuts in rows:
         exact = leaf.geometry in letters  # computed at any scale
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
+            thick = quantity in ("thickness", "wall")  # of which more does no harm
             if exact and quantity in ("scale", "thin"):
                 continue
-            if quantity in trained and not (quantity in ("thickness", "wall") and cuts):
+            if quantity in trained and not (thick and cuts):
                 low, high = trained[quantity]
-                above = (
-                    0.0 if quantity in ("thickness", "wall") else value - high
-                )  # of which more does no harm
+                value = value * graph.stage.growth if thick and graph.stage else value
+                above = 0.0 if thick else value - high
                 excess = max(low - value, above) / ((high - low) or 1.0)
                 if excess > _TOLERANCE:
                     outside.setdefault(quantity, []).append((excess, value, leaf))

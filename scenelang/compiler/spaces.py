@@ -22,7 +22,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from math import asin, atan, atan2, cos, dist, hypot, inf, pi, sqrt, tan, tau
+from math import asin, atan, atan2, cos, dist, hypot, inf, isfinite, pi, sqrt, tan, tau
 from struct import pack, unpack
 from typing import TYPE_CHECKING, Any, Final, NamedTuple, cast
 
@@ -144,6 +144,12 @@ class Stage(Record):
         """World units from the middle of the view to its nearer edges, where the camera looks at."""
         return dist(self.camera.eye, self.camera.target) * tan(self.camera.fov_rad / 2)
 
+    @property
+    def growth(self) -> float:
+        """By how much the lengths of its world grow where its view becomes as large as the usual one."""
+        by = _USUAL / max(self.size, 1e-30)
+        return by if isfinite(by) and abs(by - 1.0) > 1e-9 else 1.0
+
     def scaled(self, by: float) -> Stage:
         """The same picture with all lengths of the world times a number."""
 
@@ -174,6 +180,9 @@ class Stage(Record):
         powers = [light.power for light in self.lights] + ([self.sky.power] if self.sky else [])
         faults += [fault for power in powers if (fault := light_fault(power))]
         return faults[0] if faults else None
+
+
+_USUAL: Final = Stage().size
 
 
 def _fields(part: Record) -> dict[str, Any]:

@@ -19,9 +19,11 @@ from scenelang.drawing.exact.field import leaf_distance
 from scenelang.drawing.how import RenderError
 from scenelang.drawing.neural.field import BLEND
 from scenelang.drawing.neural.files import load_arrays
-from scenelang.drawing.neural.network import Floats, FramedArrays, FramedConfig
-from scenelang.drawing.neural.units import sector
+from scenelang.drawing.neural.network import FramedArrays, FramedConfig
+from scenelang.drawing.neural.units import FIRST, RADIAL, LeafUnits
+from scenelang.drawing.neural.units import SECTORS as ORDERS
 from scenelang.drawing.solid.network import Formula, SolidArrays, SolidCell
+from scenelang.drawing.solid.norms import Norms
 
 if TYPE_CHECKING:
     from scenelang.compiler.program import Program
@@ -29,44 +31,28 @@ if TYPE_CHECKING:
 SHARP = 1e6  # per world unit: gates of the plane's cell open within a millionth
 
 
-class ExactShape:
-    """Distance of a leaf of the plane in place of a decoder; it changes by no more than a point moves."""
+def exact_units(geometry: str) -> Norms:
+    """Norm units that are the distance of a leaf of the plane, by the edge in half a sector."""
+    if geometry not in SECTORS:  # a disc
+        return Norms(np.ones((1, 1)), np.zeros(1), np.ones(()), (RADIAL,), (1,), 0)
+    order, _, outer, inner = SECTORS[geometry]
+    if order not in ORDERS:  # a square, by |x| and |y|
+        return Norms(np.tile(np.eye(2), (2, 1)), np.full(4, -inner), np.zeros(()), (1, 2), (2,), 2)
+    half = math.pi / order
+    u, v = inner * math.cos(half) - outer, inner * math.sin(half)
+    length = math.hypot(u, v)
+    cos, sin = u / length, v / length
+    off, along = [sin, -cos, -sin * outer], [cos, sin, -cos * outer]
+    before = [-number for number in along]
+    inside = [-number for number in off]
+    beyond = [*along[:2], along[2] - length]
+    lines = np.array([inside, beyond, off, before])
+    first = FIRST + 2 * ORDERS.index(order)
+    return Norms(lines[:, :2], lines[:, 2], np.zeros(()), (first, first + 1), (2,), 0, 2)
 
-    def __init__(self, geometry: str) -> None:
-        self.row = GEOMETRIES[geometry]
 
-    def distance(self, q: Array) -> Array:
-        """Distances (M,), in leaf units, at leaf coordinates (2, M)."""
-        return self.row.distance(q)
-
-    def rise(self, q: Floats, radius: Floats) -> Floats:
-        """Greatest difference (M,) of distances at leaf coordinates (2, M) from those within radii (M,)."""
-        return radius
-
-
-class ExactSectors(ExactShape):
-    """Distance of a shape of dihedral symmetry, without angles: a point is mirrored into the half sector that
-    one segment bounds (`Geometry.sectors`) and turned, so that the segment lies along an axis.
-    """
-
-    def __init__(self, geometry: str) -> None:
-        super().__init__(geometry)
-        self._order, phase, outer, inner = SECTORS[geometry]
-        self._first = math.cos(phase), math.sin(phase)
-        half = math.pi / self._order
-        u, v = inner * math.cos(half) - outer, inner * math.sin(half)
-        self._outer, self._length = outer, math.hypot(u, v)
-        self._along = u / self._length, v / self._length
-
-    def distance(self, q: Array) -> Array:
-        cos, sin = self._first
-        x, y = q
-        u, v = sector(NUMPY, cos * x + sin * y, abs(cos * y - sin * x), self._order)
-        u = u - self._outer
-        cos, sin = self._along
-        off, gap = sin * u - cos * v, cos * u + sin * v
-        gap -= gap.clip(0.0, self._length)
-        return np.copysign(np.sqrt(gap * gap + off * off), off)
+def _narrow(part: Any) -> Any:
+    return part.astype(np.float32) if isinstance(part, np.ndarray) else part
 
 
 class ClosedPlane(FramedArrays):
@@ -75,7 +61,7 @@ class ClosedPlane(FramedArrays):
     def __init__(self, model: str) -> None:
         self.__dict__.update(vars(load_arrays(model).network))
         names = load_manifest(model).geometries
-        shapes = [(ExactSectors if name in SECTORS else ExactShape)(name) for name in names]
+        shapes = [LeafUnits(NUMPY, Norms(*map(_narrow, exact_units(name)))) for name in names]
         self.config = FramedConfig(self.config.code, self.config.material_code)
         self.shapes = {code.tobytes(): shape for code, shape in zip(self.codes, shapes, strict=True)}
         self.read_slope = np.float32(math.log(4 * SHARP))

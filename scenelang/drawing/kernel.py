@@ -20,6 +20,7 @@ import numpy.typing as npt
 
 from scenelang.drawing.arrays import Array
 from scenelang.drawing.how import RenderError, check_time
+from scenelang.drawing.neural import tables as flat
 from scenelang.drawing.tables import (
     AROUND,
     CELL,
@@ -38,7 +39,10 @@ from scenelang.drawing.tables import (
 
 FOLDER: Final = Path(__file__).resolve().parent
 ROOT: Final = FOLDER.parents[1]  # of a checkout
-_ROWS: Final = (OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE, NODE, AROUND)
+_ROWS: Final = (
+    *(OBJECT, STEP, DECODER, CELL, TEXTURE, PIECE, SCENE, LAMP, STAGE, NODE, AROUND),
+    *(flat.SHAPE, flat.STEP, flat.LEAF, flat.JOINT, flat.FLAT, flat.PAGE),
+)
 _SIZES: Final = [dtype.itemsize for dtype in _ROWS]
 _CALLS: Final = {
     **{"newest": ("", "i"), "sizes": ("p", ""), "scratch": ("ip", "l")},
@@ -52,6 +56,7 @@ _CALLS: Final = {
     },
     **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
+    **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
 }
 """Arguments and results of the library's functions: i int32, l int64, f float32, p an address."""
 _TYPES: Final = {
@@ -319,6 +324,36 @@ class Kernel:
                 counts[1] += counts[0]
         return result, tuple(counts[1].tolist())
 
+    def plane(
+        self, tables: flat.FlatTables, page: Rows, rows: range, out: npt.NDArray[Any]
+    ) -> tuple[int, int, int]:
+        """Draw rows of a picture of a `PAGE` row into ``out``, colours (rows, width, 3 or 4) float32, or
+        owners (rows, width) int32. Counts are of pairs of points and objects, of pixels of which all samples
+        were taken, and of those that were asked one by one.
+        """
+        owners = out.dtype == np.int32
+        assert out.flags.c_contiguous
+        assert out.shape[:2] == (len(rows), int(page["width"]))
+        assert (out.ndim == 2) == owners == (int(page["samples"]) == flat.WAYS.index("owners"))
+        assert owners or (out.dtype == np.float32 and out.shape[2] == int(page["channels"]))
+        scratch = np.empty(64 * (2 + int(tables.scene["objects"]) + int(tables.scene["groups"])), np.uint8)
+        counts = np.zeros(3, np.int64)
+        places = (None, out.ctypes.data) if owners else (out.ctypes.data, None)
+        given = tables.scene.ctypes.data, page.ctypes.data, rows.start, len(rows)
+        self._library.plane(self.variant, *given, *places, counts.ctypes.data, scratch.ctypes.data)
+        pairs, refined, met = counts.tolist()
+        return pairs, refined, met
+
+    def states(self, tables: flat.FlatTables, p: npt.NDArray[Any], room: float = 0.0) -> Floats:
+        """States (M,) of the plane's fold at points (2, M), right within ``room`` world units around them."""
+        p = np.ascontiguousarray(p, np.float32)
+        result = np.empty(p.shape[1], np.float32)
+        assert p.shape == (2, len(result))
+        scratch = np.empty(64 * (2 + int(tables.scene["objects"])), np.uint8)
+        given = tables.scene.ctypes.data, len(result), p.ctypes.data, room
+        self._library.states(self.variant, *given, result.ctypes.data, scratch.ctypes.data)
+        return result
+
     def around(
         self,
         tables: Tables,
@@ -508,6 +543,6 @@ def there_is_a_kernel() -> bool:
     try:
         load_kernel()
     except KernelError as error:
-        warnings.warn(f"{error}; torch draws solids in its place, slowly, and no skies", stacklevel=2)
+        warnings.warn(f"{error}; torch draws in its place, slowly, and no skies", stacklevel=2)
         return False
     return True

@@ -90,7 +90,7 @@ def draw(program: Program, how: How = DEFAULT, *, place: str | None = None, **ru
     if place is None:
         from scenelang.drawing.small import choose_drawer
 
-        library, _ = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
+        library, _ = choose_drawer(program, how.device, exact=how.backend == "exact")
         place = library if library == "numpy" else how.device
     if place == "numpy":
         from scenelang.drawing.small import draw_small

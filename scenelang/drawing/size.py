@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from math import isfinite
 
 import numpy as np
 
@@ -15,19 +14,11 @@ from scenelang.compiler.spaces import EXTINCTION, Stage
 from scenelang.compiler.steps import Affine
 from scenelang.language.nodes import DENSEST
 
-USUAL = Stage().size  # world units
-
-
-def growth(stage: Stage | None) -> float:
-    """By how much the lengths of a stage's world grow where its view becomes as large as the usual one."""
-    by = 1.0 if stage is None else USUAL / max(stage.size, 1e-30)
-    return by if isfinite(by) and abs(by - 1.0) > 1e-9 else 1.0
-
 
 def sized(program: Program) -> Program:
     """The same picture of a Program of solids whose view is as large as the usual one."""
-    by, layout = growth(program.stage), LAYOUTS[3]
-    if program.stage is None or by == 1.0:
+    layout = LAYOUTS[3]
+    if program.stage is None or (by := program.stage.growth) == 1.0:
         return program
     vectors, places = program.vectors.astype(np.float64), layout.places
     parts = layout.unpack(vectors)
@@ -39,8 +30,8 @@ def sized(program: Program) -> Program:
 
 
 def sized_root(root: Fold, stage: Stage) -> tuple[Fold, Stage, float]:
-    """The root of a graph and its stage as of `sized`, and their `growth`."""
-    by = growth(stage)
+    """The root of a graph and its stage as of `sized`, and by how much it grows."""
+    by = stage.growth
 
     def scaled(node: Node, moves: tuple[Move, ...] = ()) -> Node:
         if isinstance(node, Leaf):

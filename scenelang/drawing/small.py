@@ -21,22 +21,17 @@ from scenelang.compiler.manifest import load_manifest
 from scenelang.compiler.program import Program, ProgramError
 from scenelang.compiler.weights import ModelError
 from scenelang.drawing.closed import field_of
-from scenelang.drawing.how import Device, RenderError, Samples, keep_memory, threads_for
+from scenelang.drawing.how import Device, RenderError, keep_memory, threads_for
 from scenelang.drawing.image import Image
 from scenelang.drawing.kernel import there_is_a_kernel
 from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
-from scenelang.drawing.work import work_ms
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
 
-MOST_MS: Final = 250.0
-"""Work up to which numpy draws: a quarter of the least that importing torch was seen to take."""
 Drawer = tuple[Literal["numpy", "torch"], str]
 """The library that draws a picture, and the reason in words."""
 
 
-def choose_drawer(
-    program: Program, device: Device = "auto", samples: Samples = "adaptive", *, exact: bool = False
-) -> Drawer:
+def choose_drawer(program: Program, device: Device = "auto", *, exact: bool = False) -> Drawer:
     """Choose the library for a single picture; `RenderError` where there is no such model."""
     if exact:
         return "numpy", "formulas in the network's place"
@@ -46,21 +41,13 @@ def choose_drawer(
         renderer = load_manifest(program.model).renderer
     except KeyError:
         raise RenderError(f"unknown model `{program.model}`") from None
-    if renderer == "solid":
-        return (
-            ("numpy", "as solids are by default") if there_is_a_kernel() else ("torch", "there is no kernel")
-        )
-    if renderer != "framed":
+    if renderer not in ("framed", "solid"):
         return "torch", f"a `{renderer}` network is large work for any picture"
-    ms = work_ms(program, samples)
-    numpy = ms <= MOST_MS
-    bound = "at most" if numpy else "more than"
-    return "numpy" if numpy else "torch", f"about {ms:,.0f} ms of work, {bound} {MOST_MS:.0f}"
+    return ("numpy", "the kernel draws") if there_is_a_kernel() else ("torch", "there is no kernel")
 
 
 def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:
-    """Draw a Program by numpy, or by formulas if ``exact``: the plane on one core, large solids on several;
-    the rest is as of `Run`.
+    """Draw a Program without torch, or by formulas if ``exact``; the rest is as of `Run`.
 
     Raises `RenderError` where the model's weights are missing or not those it was compiled for, or there are
     no formulas.
@@ -68,8 +55,6 @@ def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> 
     keep_memory()
     try:
         network = field_of(program, exact)
-        if program.stage is None:
-            run |= {"threads": 1, "split": 1}
         run["threads"] = run.get("threads") or threads_for(program.canvas)
         drawing = draw_objects(network, program, **run)
     except (ModelError, ProgramError) as error:

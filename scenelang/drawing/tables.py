@@ -49,7 +49,7 @@ FORMULAS = ("sphere", "torus", "box", "cylinder", "cone", "capsule", "octahedron
 PICTURE, SPACE, LINEAR, RADIAL = range(4)  # of textures
 
 
-def _dtype(*kinds: str) -> np.dtype[Any]:
+def dtype_of(*kinds: str) -> np.dtype[Any]:
     """The dtype of a struct: of each kind, f4, i4 or u8 for an address, members, arrays with their sides."""
     fields: list[Any] = []
     for kind, *members in map(str.split, kinds):
@@ -59,30 +59,30 @@ def _dtype(*kinds: str) -> np.dtype[Any]:
     return np.dtype(fields, align=True)
 
 
-OBJECT = _dtype(
+OBJECT = dtype_of(
     "f4 map[12] scale reach moved radius ball rate centre[3] extent low[3] high[3] amount frequency",
     "f4 first wall last late detail look[12]",
     "i4 flags ends decoder step steps texture depth path[15]",
 )
-STEP = _dtype("i4 kind", "f4 twirl rate map[12]")
-DECODER = _dtype("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
-CELL = _dtype("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
-TEXTURE = _dtype("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
-PIECE = _dtype("i4 ray", "f4 begin end before sigma")
-SCENE = _dtype(
+STEP = dtype_of("i4 kind", "f4 twirl rate map[12]")
+DECODER = dtype_of("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
+CELL = dtype_of("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
+TEXTURE = dtype_of("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
+PIECE = dtype_of("i4 ray", "f4 begin end before sigma")
+SCENE = dtype_of(
     "i4 objects groups deepest rows switched clipping media mixed hues dense coloured",
     "f4 sigma reach",
     "u8 object step decoder cell texture",
 )
-LAMP = _dtype("f4 at[3] power[3] radius")
-STAGE = _dtype(
+LAMP = dtype_of("f4 at[3] power[3] radius")
+STAGE = dtype_of(
     "f8 forward[3] right[3] up[3] px",
     "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift contrast deep[3]",
     "i4 lamps grounded transparent glow width height count every nodes",
     "u8 lamp opaque hazy",
 )
-NODE = _dtype("f4 p[3] n[3] sent[3] colour[3] weight")
-AROUND = _dtype(
+NODE = dtype_of("f4 p[3] n[3] sent[3] colour[3] weight")
+AROUND = dtype_of(
     "f4 low[3] side horizon[3] zenith[3] floor fade scale warp corner[3] spacing",
     "i4 nodes first near counts[3] ground grounded hollow lamps sides[3] steps discs",
     "u8 node index alike about lamp haze disc",
@@ -423,7 +423,38 @@ def stage_rows(
     return result, (lamps, shadows)
 
 
-class Tables:
+class Held:
+    """Arrays that tables point to."""
+
+    def __init__(self) -> None:
+        self._kept: list[Any] = []
+
+    def held(self, array: npt.NDArray[Any]) -> int:
+        """The address of an array that is kept; raises `ProgramError` where a number of it is none."""
+        if not finite(array):
+            raise ProgramError("numbers that the network cannot draw with")
+        self._kept.append(np.ascontiguousarray(array))
+        return int(self._kept[-1].ctypes.data)
+
+
+def texture_row(tables: Held, row: Rows, paint: Paint, texture: Any, xp: Any) -> None:
+    """Fill a row of a paint's texture, whose arrays tables keep."""
+    row["place"] = np.array(texture.place.rows).reshape(-1)
+    if isinstance(paint.element, Gradient):
+        stops = paint.element.stops
+        row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR
+        row["stops"], row["data"] = len(stops), tables.held(np.array(stops, np.float32))
+    else:
+        row["kind"] = PICTURE if texture.lattice is None else SPACE
+        row["high"], row["wide"] = texture.sides
+        row["data"] = tables.held(np.asarray(xp.to_numpy(texture.texels)))
+    steps = np.zeros((len(paint.steps), 4), np.float32)
+    for step, (name, *numbers) in zip(steps, paint.steps, strict=True):
+        step[: 1 + len(numbers)] = list(COLOUR_STEPS).index(name), *numbers
+    row["steps"], row["step"] = len(steps), tables.held(steps)
+
+
+class Tables(Held):
     """What the kernel takes of a scene; keeps the arrays that the `SCENE` row points to.
 
     Of rows of vectors (N, 64) and tokens (N,), ``brought`` and ``paints`` are elements and textures, None
@@ -447,7 +478,7 @@ class Tables:
         self.network, self.groups = network, groups
         self.objects = read_objects(vectors, network.layout, groups, widths, reach)
         rows = self.objects.rows
-        self._kept: list[Any] = []  # what tables point to
+        super().__init__()
         self.edged = False  # whether a decoder shows edges, which rays may clip
         with network.xp.inference():
             draws = self.objects.flagged(DRAWS)
@@ -464,19 +495,12 @@ class Tables:
         hues, sigma = self.looks.hues, self.looks.sigma
         coloured = bool(kinds.any()) and np.ptp(register[hues - 3 : hues, kinds], 1).max() > 0
         mixed = bool(kinds.any()), bool(kinds.any() and not kinds.all()), hues, sigma is None, coloured
-        tables = map(self._held, (rows, self.objects.steps, self.decoders, cells, textures))
+        tables = map(self.held, (rows, self.objects.steps, self.decoders, cells, textures))
         self.scene = np.array((*sizes, *mixed, sigma or 0.0, reach, *tables), SCENE)
-
-    def _held(self, array: npt.NDArray[Any]) -> int:
-        """The address of an array that is kept; raises `ProgramError` where a number of it is none."""
-        if not finite(array):
-            raise ProgramError("numbers that the network cannot draw with")
-        self._kept.append(np.ascontiguousarray(array))
-        return int(self._kept[-1].ctypes.data)
 
     def _textures(self, paints: Sequence[Paint | None], frames: npt.NDArray[np.float32], draws: Mask) -> Rows:
         """Rows of textures of objects that draw; the others leave colours as they are."""
-        network, kinds = self.network, list(COLOUR_STEPS)
+        network = self.network
         worn = [i for i, paint in enumerate(paints) if paint is not None and draws[i]]
         result = np.zeros(len(worn), TEXTURE)
         self.objects.rows["texture"][worn] = np.arange(len(worn))
@@ -484,20 +508,8 @@ class Tables:
             paint = paints[i]
             assert paint is not None
             texture: Any = texture_of(network.xp, paint, frames[i], network.codes, light=True)
-            row["place"] = np.array(texture.place.rows).reshape(-1)
             self.objects.rows["detail"][i] = texture.detail / self.objects.rows["scale"][i]
-            if isinstance(paint.element, Gradient):
-                stops = paint.element.stops
-                row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR
-                row["stops"], row["data"] = len(stops), self._held(np.array(stops, np.float32))
-            else:
-                row["kind"] = PICTURE if texture.lattice is None else SPACE
-                row["high"], row["wide"] = texture.sides
-                row["data"] = self._held(np.asarray(network.xp.to_numpy(texture.texels)))
-            steps = np.zeros((len(paint.steps), 4), np.float32)
-            for step, (name, *numbers) in zip(steps, paint.steps, strict=True):
-                step[: 1 + len(numbers)] = kinds.index(name), *numbers
-            row["steps"], row["step"] = len(steps), self._held(steps)
+            texture_row(self, row, paint, texture, network.xp)
         return result
 
     def _decoders(self, codes: npt.NDArray[np.float32], brought: Sequence[Element | None]) -> Rows:
@@ -512,7 +524,7 @@ class Tables:
             if isinstance(key, Element):
                 shape = grid_shape(key, xp, network.codes, key in grown)
                 row["kind"], row["width"] = GROWN if key in grown else GRID, shape.side
-                row["data"] = self._held(np.asarray(xp.to_numpy(shape.nodes)))
+                row["data"] = self.held(np.asarray(xp.to_numpy(shape.nodes)))
                 sides.append(element_box(key))
                 continue
             decoder: Any = network.decoder(xp.array(np.frombuffer(key, np.float32).copy(), network.codes))
@@ -524,7 +536,7 @@ class Tables:
                 _norms(row, decoder, xp)
             else:
                 row["kind"], row["width"] = SILU, len(decoder[0][1])
-                row["data"] = self._held(_layers(decoder, xp))
+                row["data"] = self.held(_layers(decoder, xp))
         rows["decoder"] = [number[key] for key in keys]
         box = np.array(sides).reshape(-1, 2, 3)[rows["decoder"]]
         # a small box, where an affine map leads to the leaf

@@ -99,7 +99,7 @@ def _of_solids(program: Program, network: Any) -> Load:
     return Load(len(program), pixels, each * pixels, each * min(width, height), light)
 
 
-_NS: Final = (4.3e6, 11e3, 11.0, 0.0, 3600.0)
+_NS: Final = (1.8e6, 12e3, 5.0, 0.0, 100.0)
 """Nanoseconds of a frame, an object, a pixel, a meeting and a pixel around bounds (`Load.row`).
 
 `python -m lab bench work` fits them and `_SHARES` to the examples and random scenes on several canvases.

@@ -377,7 +377,8 @@ def drawing_cost(
     from scenelang.drawing.neural.load import place_of
     from scenelang.drawing.torch_backend import draw_program
 
-    by_numpy = program.stage is not None and place_of(model.network).type == "cpu"  # as `render` draws them
+    framed = model.manifest.renderer in ("framed", "solid")  # which `render` draws by the kernel
+    by_numpy = framed and place_of(model.network).type == "cpu"
 
     draw = partial(draw_small, program) if by_numpy else partial(draw_program, program, model)
     times = []

@@ -11,12 +11,11 @@ import json
 import os
 import subprocess
 import sys
-import threading
 import time
 from collections import deque
 from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
 from functools import lru_cache
 from importlib.metadata import version
 from pathlib import Path
@@ -26,7 +25,6 @@ from typing import Any, Final, NamedTuple
 from scenelang.compiler.program import Program, parse_program, program_bytes
 from scenelang.drawing.how import DEFAULT, How, RenderError, threads_for
 from scenelang.drawing.image import Image, Output, enlarged, packed
-from scenelang.drawing.neural.draw import TileCache
 from scenelang.output.frames import Clip, Drawable, Shot, frame_key, put_frame
 from scenelang.output.workers import Connection
 
@@ -41,13 +39,10 @@ class Painter:
 
     clip: Clip  # the animation
     how: How = DEFAULT  # how they are drawn
-    # the previous picture, whose unchanged parts are reused
-    kept: TileCache = field(default_factory=TileCache, repr=False)
     outputs: tuple[Output, ...] = ()  # next to each picture
-    single: bool = False  # draw each frame as a single picture: small ones by numpy
     load_s: float = 0.0  # time of loading torch
 
-    def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
+    def prepare(self, shot: Shot) -> Drawable:
         """Compile a frame and compute the key of its files; raises as `Clip.program`, or `RenderError`."""
         program, place = None, "cpu"
         if self.how.backend == "reference":
@@ -56,7 +51,7 @@ class Painter:
             names: tuple[object, ...] = (self.clip.texts,)
         else:
             program = self.how.sampled(self.clip.program(shot))
-            place = self._place(program, single or self.single)
+            place = self._place(program)
             library = place if place == "numpy" else "torch"
             cores = () if place == "numpy" and program.stage is None else (self.split(program),)
             way = self.how.backend, *self.how.care.values()
@@ -66,15 +61,13 @@ class Painter:
             key = frame_key(key, self.outputs, *names)
         return Drawable(shot.number, key, shot, program, place)
 
-    def _place(self, program: Program, single: bool) -> str:
+    def _place(self, program: Program) -> str:
         """The library or device that draws a Program: numpy, or a torch device."""
-        how = self.how
-        if single or program.stage is not None or how.backend == "exact":
-            from scenelang.drawing.small import choose_drawer
+        from scenelang.drawing.small import choose_drawer
 
-            exact = how.backend == "exact"
-            if choose_drawer(program, how.device, how.care["samples"], exact=exact)[0] == "numpy":
-                return "numpy"
+        how = self.how
+        if choose_drawer(program, how.device, exact=how.backend == "exact")[0] == "numpy":
+            return "numpy"
         started = time.perf_counter()
         from scenelang.drawing.torch_backend import choose_device
 
@@ -95,7 +88,7 @@ class Painter:
             )
         how = self.how._replace(threads=self.split(frame.program))
         place, split = frame.place, how.threads
-        return draw(frame.program, how, place=place, split=split, kept=self.kept, progress=progress).image
+        return draw(frame.program, how, place=place, split=split, progress=progress).image
 
     def draft(self, frame: Drawable) -> Image | None:
         """A coarse picture of solids in the frame's size, for about a twentieth of the work; else None."""
@@ -126,12 +119,12 @@ class Errand(NamedTuple):
     outputs: tuple[Output, ...] = ()  # next to it
     how: How = DEFAULT  # how it is drawn
 
-    def run(self, program: bytes, kept: TileCache) -> dict[Path, bytes]:
+    def run(self, program: bytes) -> dict[Path, bytes]:
         """Draw a Program's bytes; returns those of its files and raises as `scenelang.render_outputs`."""
         from scenelang.drawing.render import draw, outputs_of
 
         read, how = parse_program(program), How(*self.how)._replace(threads=1)
-        image = draw(read, how, place=self.place, split=self.split, kept=kept).image
+        image = draw(read, how, place=self.place, split=self.split).image
         return packed(image, outputs_of(read, self.outputs, how), Path(self.file))
 
 
@@ -209,7 +202,7 @@ def main() -> None:
     # Answers go to standard output; prints of libraries go to standard error.
     answers = os.fdopen(os.dup(1), "wb")
     os.dup2(2, 1)
-    cache, source = TileCache(), sys.stdin.buffer
+    source = sys.stdin.buffer
     while line := source.readline():
         head = json.loads(line)
         program = source.read(head["bytes"])
@@ -217,7 +210,7 @@ def main() -> None:
             return
         errand, answer = Errand(*head["errand"]), dict[str, Any]()
         try:
-            put_frame(errand.run(program, cache))
+            put_frame(errand.run(program))
         except RenderError as error:
             answer = {"error": str(error)}
         except OSError as error:
@@ -235,7 +228,6 @@ if __name__ == "__main__":
 BATCH_S: Final = 0.25  # drawing time of a batch, against which a task's own milliseconds are small
 MOST_BATCH: Final = 64
 MOST_BYTES: Final = 4 << 20  # of the Programs in a batch; elements make them large
-_local = threading.local()
 
 
 class Cluster:
@@ -289,7 +281,6 @@ class Cluster:
 
 def draw_batch(batch: Sequence[tuple[bytes, Errand]]) -> tuple[float, list[dict[str, bytes]]]:
     """Draw Programs' bytes on this machine: the processor's seconds, and the files of each by their names."""
-    cache = _local.__dict__.setdefault("kept", TileCache())
     started = time.process_time()  # others on this machine do not make batches smaller
-    result = [{p.name: data for p, data in errand.run(program, cache).items()} for program, errand in batch]
+    result = [{p.name: data for p, data in errand.run(program).items()} for program, errand in batch]
     return time.process_time() - started, result

@@ -21,9 +21,11 @@ from scenelang.assets.element import Gradient
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
+from scenelang.drawing.kernel import load_kernel
 from scenelang.drawing.neural.assets import stepped
+from scenelang.drawing.neural.draw import draws
 from scenelang.drawing.neural.field import NO_TEXTURE, Field
-from scenelang.drawing.neural.meetings import Pairs, meetings_of
+from scenelang.drawing.neural.tables import tables_of
 from scenelang.output.mesh import crossed, zeros
 
 Floats = npt.NDArray[np.float64]
@@ -151,21 +153,13 @@ class Shapes:
     def ask(self, field: Field, p: Floats, half_px: float = 0.0) -> Floats:
         """Distances (G, B) of a field at points (2, G, B); right within half a side around them."""
         world = (p - self.half) / self.unit * [[[1.0]], [[-1.0]]]
-        every = np.isinf(field.reach)
-        low, high = field.frames.boxes(np.where(every, 0.0, field.reach))
-        least, most = world.min(1) - half_px / self.unit, world.max(1) + half_px / self.unit
-        meets = ((low[:, None] <= most[..., None]) & (high[:, None] >= least[..., None])).all(0)
-        pairs = Pairs.of(*np.nonzero(meets | every))
-        result = np.full(p.shape[1:], field.nothing)
-        if len(pairs):
-            meetings, _ = meetings_of(pairs)
-            objects, xp = meetings.pairs.object, field.xp
-            with xp.inference():
-                points = world[..., meetings.columns[meetings.places()]].astype(np.float32)
-                q = field.frames.local(xp, objects, points)
-                memory = field.fold(meetings, field.features(objects, q, np.ones(len(objects), bool)))
-            result[:, meetings.columns] = memory[:, 0]
-        return np.asarray(result * (self.unit / field.unit))
+        points = world.reshape(2, -1)
+        if draws(field):
+            result = load_kernel().states(tables_of(field), points, half_px / self.unit)
+        else:
+            with field.xp.inference():
+                result = field.folded(points.astype(np.float32))[0][0]
+        return np.asarray(result.reshape(p.shape[1:]) * (self.unit / field.unit), np.float64)
 
 
 class Region:

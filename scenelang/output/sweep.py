@@ -558,7 +558,7 @@ def render_many(
     checked = How(**how).checked()
     clip = Variants(source, rows, frame, diagnostics, target, outputs, stem)
     run = make(
-        Painter(clip, checked, outputs=clip.outputs, single=True), target, range(len(rows)), jobs=jobs,
+        Painter(clip, checked, outputs=clip.outputs), target, range(len(rows)), jobs=jobs,
         cluster=cluster, progress=progress,
     )  # fmt: skip
     if table is not None:

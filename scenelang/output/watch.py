@@ -19,7 +19,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, Final, Literal
 
 from scenelang.drawing.how import How, RenderError
-from scenelang.drawing.neural.draw import TileCache
 from scenelang.language.diagnostics import Diagnostic, Diagnostics
 from scenelang.language.evaluation import Source
 from scenelang.language.reports import SceneError, render_text
@@ -75,7 +74,6 @@ class Easel:
     seen: Stamps = field(default_factory=dict)  # their stamps when their names were read
     _key: str | None = None
     _image: Image | None = None
-    _kept: TileCache = field(default_factory=TileCache)
     _took_s: float = float("inf")  # drawing time of the last picture
 
     def __post_init__(self) -> None:
@@ -102,7 +100,7 @@ class Easel:
         started = time.perf_counter()
         clip = self._open(diagnostics)
         numbers = clip.numbers(self.frames)
-        painter = Painter(clip, self.how, self._kept)
+        painter = Painter(clip, self.how)
         if self.target is not None and self.target.kind == "video" and not clip.animates:
             diagnostics.add("E0337", f"`{self.out}` is for animations, and the scene has no animate(…)", None)
             raise SceneError(diagnostics)
@@ -111,7 +109,7 @@ class Easel:
             outcome.good, outcome.files = True, run.files
             outcome.seconds = {"compile": run.compile_s, "draw": run.draw_s, "save": run.encode_s}
             return
-        frame = painter.prepare(clip.shot(self.frame), single=True)
+        frame = painter.prepare(clip.shot(self.frame))
         outcome.seconds["compile"] = time.perf_counter() - started - painter.load_s
         if painter.load_s:
             outcome.seconds["load torch"] = painter.load_s

@@ -24,7 +24,6 @@ from scenelang.compiler.program import Program, ProgramError
 from scenelang.drawing.how import How, RenderError
 from scenelang.drawing.image import Image
 from scenelang.drawing.metrics import flip, over_white, psnr, side_by_side, ssim
-from scenelang.drawing.neural.draw import TileCache
 from scenelang.drawing.render import draw, draw_exact
 from scenelang.drawing.small import draw_small
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
@@ -44,7 +43,6 @@ MOST_LIT: Final = 200
 """Objects of a scene under a sky whose light a page is given a draft of."""
 MOST_TOLD: Final = 100  # problems of a scene
 _BY_NUMPY: Final = ("framed", "solid")  # renderers
-_CACHE: Final = TileCache()
 _EXACT: dict[str, Image] = {}  # the last exact picture, by what it shows
 
 Job = dict[str, Any]
@@ -177,7 +175,7 @@ def _draw(clip: Clip, frame: int) -> tuple[Image, dict[str, float]]:
 def _by_network(program: Program, tell: Tell | None = None) -> Image:
     _check_size(program.canvas)
     if load_manifest(program.model).renderer in _BY_NUMPY:
-        return draw_small(program, kept=_CACHE, progress=tell).image
+        return draw_small(program, progress=tell).image
     return draw(program, How(device="cpu", threads=1), progress=tell).image
 
 
@@ -205,10 +203,10 @@ def _picture(job: Job, image: Image, ms: dict[str, float], **facts: Any) -> Answ
 class _ByNumpy(Painter):
     """Draws frames without torch, as single pictures are."""
 
-    def prepare(self, shot: Shot, *, single: bool = False) -> Drawable:
+    def prepare(self, shot: Shot) -> Drawable:
         program = self.clip.program(shot)
         if load_manifest(program.model).renderer not in _BY_NUMPY:
-            return super().prepare(shot, single=single)
+            return super().prepare(shot)
         return Drawable(shot.number, frame_key("play", program.digest()), shot, program, "numpy")
 
 

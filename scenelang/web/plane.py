@@ -17,7 +17,7 @@ from scenelang.language.words import TOKENS
 from scenelang.web.arrays import ArrayStore, web
 from scenelang.web.solid import unit_lines
 
-NODES: Final = 129  # along a side of the grid for bounds of decoders
+NODES: Final = 257  # along a side of the grid for bounds of decoders
 INSIDE: Final = 0.01  # leaf units: least depth inside of points that count as covered
 UNKNOWN: Final = 1e9  # leaf units: a bound that rules nothing out
 
@@ -78,7 +78,7 @@ def leaves(network: FramedArrays) -> list[LeafDecoder]:
         if not isinstance(decoder, LeafUnits):
             result.append(LeafDecoder(*_layers(decoder), (UNKNOWN,) * 3, 0.0))
             continue
-        middle, rise = decoder.distance(p), decoder.rise(p, np.full(p.shape[1], off))
+        middle, rise = decoder.distance(p), decoder.steepest * off
         bounds = tuple(float((n - (middle - rise)).max()) + off for n in (*abs(p), radius))
         inner = max(0.0, float(radius[middle + rise > -INSIDE].min()) - off)
         result.append(LeafDecoder(*_units(decoder), bounds, inner))

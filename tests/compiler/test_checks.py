@@ -116,10 +116,9 @@ def test_bounds_of_solids() -> None:
 
 def test_views_of_any_size_are_drawn_and_not_warned_of() -> None:
     for v in (1e-4, 1.0, 1e4):
-        text = f"camera([0, 0, {v}], target = [0, 0, 0], fov = 90deg); subtract {{ sphere {{ scale({0.3 * v}); }}"
-        assert [
-            *nsg.check_text(f"{text} sphere {{ scale({0.2 * v}); translate({0.2 * v}, 0, 0); }} }}")
-        ] == []
+        view = f"camera([0, 0, {v}], target = [0, 0, 0], fov = 90deg);"
+        hole = f"sphere {{ scale({0.2 * v}); translate({0.2 * v}, 0, 0); }}"
+        assert [*nsg.check_text(f"{view} subtract {{ sphere {{ scale({0.3 * v}); }} {hole} }}")] == []
 
 
 def test_crowds_and_hairlines_are_drawn_well_and_not_warned_of() -> None:

@@ -12,10 +12,8 @@ from lab.sets.plane import SETS, random_scene
 from lab.training.network import Trainee
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.program import Program
-from scenelang.drawing.neural.coverage import Coverage
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.load import Model, load_model
-from scenelang.drawing.neural.meetings import raster
 from scenelang.drawing.neural.network import TOKENS, FramedConfig
 from scenelang.language.words import BLEND
 
@@ -99,12 +97,9 @@ def test_streaming_equals_the_network_it_was_trained_as(model: Model) -> None:
     network.load_state_dict(model.network.state_dict())
     for program in programs("chains", 4):
         field, count = Field(network, program.vectors, program.tokens), len(program)
-        canvas = (24, 16)
-        grid = raster(canvas, range(16))
-        tile = Coverage(field, skip=False).tile(canvas, range(16), "one")
-        shown = torch.from_numpy(tile.picture.reshape(-1, 4).T.copy())
-        p = torch.from_numpy(grid.centres((np.arange(24), np.zeros(24, int)), 16)[:, ::16].copy())
-        p = p.reshape(2, -1)
+        axes = torch.linspace(-1.5, 1.5, 24), torch.linspace(-1, 1, 16)
+        p = torch.stack(torch.meshgrid(*axes, indexing="ij")).reshape(2, -1)
+        shown = field.picture(field.folded(p)[0])
         every = np.repeat(np.arange(count), p.shape[1])
         q = field.frames.local(field.xp, every, p.repeat(1, count)).reshape(2, count, -1).swapaxes(0, 1)
         scale = torch.from_numpy(field.frames.scale.astype(np.float32))

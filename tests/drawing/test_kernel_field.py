@@ -213,7 +213,7 @@ def test_a_library_of_other_sources_is_told(tmp_path: Path, monkeypatch: pytest.
         with pytest.raises(KernelError, match="pip install ziglang"):
             load_kernel.__wrapped__()
     monkeypatch.setattr("scenelang.drawing.kernel.load_kernel", load_kernel.__wrapped__)
-    with pytest.warns(UserWarning, match="pip install ziglang.*torch draws solids in its place"):
+    with pytest.warns(UserWarning, match="pip install ziglang.*torch draws in its place"):
         assert not there_is_a_kernel.__wrapped__()
 
 

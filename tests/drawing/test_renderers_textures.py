@@ -8,7 +8,8 @@ import numpy as np
 import pytest
 
 from scenelang.compiler.program import Paint, Program, ProgramError
-from scenelang.drawing.neural.draw import TileCache, draw
+from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.neural.draw import draw
 from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.load import load_model
 from tests.assets.shapes import noise
@@ -71,7 +72,7 @@ def test_inside_an_object_too_a_pixel_is_the_mean_of_four_lookups(network) -> No
     exact = SLOW.picture(p.vectors, p.tokens, p.canvas, p.paints())
     found, drawing = drawn(network, p)
     np.testing.assert_allclose(found, exact, rtol=0, atol=EQUAL)
-    assert drawing.refined == 0  # the network was asked once a pixel
+    assert network.xp is not NUMPY or drawing.refined == 0  # the kernel asked once a pixel
     assert abs(drawn(network, p, samples="one")[0] - exact).max() > 0.1
 
 
@@ -91,20 +92,6 @@ def test_rows_without_paint_stay_as_they_are(network) -> None:
     np.testing.assert_array_equal(
         drawn(network, dressed(cut, [None, Paint(COARSE)]))[0], drawn(network, cut)[0]
     )
-
-
-def test_steps_between_pictures_are_drawn_again(network) -> None:
-    """Of an animation in which nothing but a texture's place or colour changes."""
-    kept, p = TileCache(), program(SCENES["unions"])
-    none = [None] * 3
-    for paint, x in (
-        (Paint(COARSE), 0.0),
-        (Paint(COARSE, STEPS[1]), 0.0),
-        (Paint(FINE), 0.0),
-        (Paint(FINE), 0.3),
-    ):
-        changed = dressed(p, [paint, *none], np.tile([1, 0, x, 0, 1, 0], (4, 1)))
-        np.testing.assert_array_equal(drawn(network, changed, kept=kept)[0], drawn(network, changed)[0])
 
 
 @pytest.mark.parametrize("number", [1e25, -1e25])

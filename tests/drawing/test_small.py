@@ -18,7 +18,7 @@ from scenelang.drawing.how import How, RenderError, Samples
 from scenelang.drawing.image import enlarged
 from scenelang.drawing.neural.load import Model
 from scenelang.drawing.neural.paper import Streaming, StreamingConfig
-from scenelang.drawing.small import MOST_MS, choose_drawer, draw_small
+from scenelang.drawing.small import choose_drawer, draw_small
 from scenelang.drawing.torch_backend import draw_program, open_model
 from scenelang.drawing.work import work_ms
 from scenelang.language.evaluation import Source
@@ -37,10 +37,12 @@ def program(text: str, **changes: object) -> Program:
 
 
 def assert_same(p: Program, **options: str) -> None:
-    """The two libraries' pictures, as they go into files too.
+    """The two libraries' pictures, as they go into files too; in the plane torch takes all samples.
 
     Of solids a pixel in 2,000 may just be sampled four times by one library and not by the other.
     """
+    if p.stage is None and options.get("samples") != "one":
+        options["samples"] = "four"
     by_torch = draw_program(p, open_model(p.model), threads=1, **options).image  # type: ignore[arg-type]
     by_numpy = draw_small(p, **options).image  # type: ignore[arg-type]
     assert by_numpy.dtype == by_torch.dtype
@@ -81,15 +83,11 @@ def test_odd_scenes_look_the_same() -> None:
         assert_same(compile_scene(nsg.loads("canvas(37, 300);" + text)))
 
 
-def test_small_work_is_numpy_s() -> None:
+def test_the_kernel_draws_whatever_it_takes() -> None:
     small, wide, many = program(STAR), program(STAR, canvas=(8000, 6000)), program(CLOUD)
-    assert choose_drawer(small)[0] == "numpy"
-    assert choose_drawer(wide)[0] == choose_drawer(many)[0] == "torch"
-    assert work_ms(small) < MOST_MS < min(work_ms(wide), work_ms(many))
+    assert {choose_drawer(p) for p in (small, wide, many)} == {("numpy", "the kernel draws")}
     assert work_ms(small, "one") < work_ms(small) < work_ms(program(STAR, canvas=(512, 512)))
     assert work_ms(wide, "four") > work_ms(wide)
-    for library, why in (choose_drawer(small), choose_drawer(many)):
-        assert f"about {work_ms(small if library == 'numpy' else many):,.0f} ms of work" in why
 
 
 def test_a_named_device_is_torch_s() -> None:
@@ -109,23 +107,19 @@ def test_networks_of_whole_pictures_are_torch_s() -> None:
         choose_drawer(replace(program(STAR), model="none"))
 
 
-def test_who_draws_is_in_a_kept_frame_s_key(tmp_path: Path) -> None:
-    """A single picture's and an animation's frame are kept apart; each repeats."""
+def test_a_frame_is_a_picture(tmp_path: Path) -> None:
     path = tmp_path / "a.nsg"
     path.write_text("canvas(48, 48);" + STAR)
-    painter = Painter(Clip(Source(path)), How(threads=1))
-    single, frame = (painter.prepare(painter.clip.shot(0), single=s) for s in (True, False))
-    assert single.key != frame.key
-    assert single.place == "numpy"
-    assert frame.place != "numpy"
-    assert np.array_equal(painter.draw(single), draw_small(single.program).image)  # type: ignore[arg-type]
-    alone = draw_program(frame.program, open_model("shapes2d"), threads=1).image  # type: ignore[arg-type]
-    assert np.array_equal(painter.draw(frame), alone), "tiles of numpy's picture were taken over"
+    painter, other = (Painter(Clip(Source(path)), How(threads=1, device=d)) for d in ("auto", "cpu"))
+    frame, by_torch = painter.prepare(painter.clip.shot(0)), other.prepare(other.clip.shot(0))
+    assert frame.key != by_torch.key
+    assert [frame.place, by_torch.place] == ["numpy", "cpu"]
+    assert np.array_equal(painter.draw(frame), draw_small(frame.program).image)  # type: ignore[arg-type]
 
 
 def test_sampling_is_counted() -> None:
-    p, model = program(STAR, canvas=(64, 64), background=(0, 0, 0)), open_model("shapes2d")
-    drawn = {s: draw_program(p, model, threads=1, samples=s) for s in get_args(Samples)[:-1]}
+    p = program(STAR, canvas=(64, 64), background=(0, 0, 0))
+    drawn = {s: draw_small(p, threads=1, samples=s) for s in get_args(Samples) if isinstance(s, str)}
     assert drawn["one"].refined == 0
     assert 0 < drawn["four"].refined == drawn["four"].met < 64 * 64  # the others have one colour
     assert 0 < drawn["adaptive"].refined < 64 * 64 / 4

@@ -97,7 +97,7 @@ def test_overlaps_are_foretold_as_they_are_drawn() -> None:
         "for (i in 0..<80) { disc { scale(0.05); translate(i % 10 / 5 - 0.9, floor(i / 10) / 5 - 0.9); } }",
         96,
     )
-    assert work_ms(apart) < work_ms(many) / 4
+    assert load_of(apart).outline < load_of(many).outline / 4
 
 
 def test_a_picture_of_too_much_is_drawn_coarser(monkeypatch: pytest.MonkeyPatch) -> None:

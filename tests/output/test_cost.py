@@ -14,10 +14,9 @@ from scenelang.cli.main import cli
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.passes import PASSES
-from scenelang.drawing.neural.draw import draw
 from scenelang.drawing.neural.field import SLACK
 from scenelang.drawing.neural.load import load_model
-from scenelang.drawing.torch_backend import draw_program
+from scenelang.drawing.small import draw_small
 from scenelang.output.frontier import choice, drawing_cost, stages, token_counts
 
 SCENE = """
@@ -67,17 +66,14 @@ def test_pixels_that_no_object_reaches_are_not_evaluated() -> None:
     """A leaf reaches its unit disc, and a little more for what the network may bulge."""
     side, radius = 200, 0.4
     scene = nsg.loads(f"canvas({side}, {side}); star {{ scale({radius}); }}")
-    model = load_model("shapes2d")
     program = compile_scene(scene)
-    drawing = draw_program(program, model, threads=1)
+    drawing = draw_small(program, threads=1)
     across = (np.arange(side) + 0.5) * 2 / side - 1
     far = np.hypot(across[:, None], across[None, :])
     disc = int((far <= radius * (1 + SLACK)).sum())
     assert 0.2 * disc < drawing.met < 0.9 * disc  # much of the disc is proved to show one colour
-    arguments = (model.framed, program)
-    assert draw(*arguments, skip=False).met == side * side
-    assert draw(*arguments, threads=3, tile=999).met == drawing.met
-    everywhere = draw(*arguments, samples="four")
+    assert draw_small(program, threads=3).met == drawing.met
+    everywhere = draw_small(program, samples="four")
     assert everywhere.refined == everywhere.met == drawing.met
 
 

@@ -13,11 +13,8 @@ import pytest
 from PIL import Image
 
 import scenelang as nsg
-from scenelang.drawing.how import How
-from scenelang.language.evaluation import Source
 from scenelang.output.animate import Progress
-from scenelang.output.frames import Clip, FrameStore, find_target
-from scenelang.output.painting import Painter
+from scenelang.output.frames import FrameStore, find_target
 from tests.output.scenes import DARK, HEAD, tricky
 
 SMALL = (24, 16)
@@ -36,28 +33,11 @@ def left(folder: Path) -> list[str]:
 
 @pytest.mark.parametrize("name", ["a chain", "a param", "warps", "settings", "hidden and seen"])
 def test_pictures_are_what_they_are_alone(name: str, tmp_path: Path) -> None:
-    """Bit for bit, also where tiles are taken over: the picture is split for four threads."""
+    """Bit for bit, on any number of threads."""
     path = write(tmp_path, tricky(name))
     for frame, image in enumerate(nsg.render_frames(path, size=(20, 48), threads=4)):
         scene = nsg.load(path, frame=frame).model_copy(update={"canvas": (20, 48)})
-        assert image.tobytes() == nsg.render(scene, device="cpu", threads=4).tobytes()
-
-
-def test_tiles_without_a_moving_object_are_taken_over(tmp_path: Path) -> None:
-    text = "square { scale(0.2); translate(0, 2); } star { scale(0.2 + u / 9); translate(0, -2); } triangle;"
-    clip = Clip(Source(write(tmp_path, HEAD + text), size=(16, 64)))
-    painter = Painter(clip, How(threads=4))
-    from scenelang.drawing.torch_backend import draw_program, open_model
-
-    model = open_model("shapes2d")
-    for frame in range(3):
-        painter.draw(painter.prepare(clip.shot(frame)))
-    again, moved = (
-        draw_program(clip.program(clip.shot(frame)), model, threads=4, kept=painter.kept) for frame in (2, 3)
-    )
-    fresh = draw_program(clip.program(clip.shot(3)), model, threads=4)
-    assert again.pairs == 0 < moved.pairs < 0.7 * fresh.pairs
-    assert moved.image.tobytes() == fresh.image.tobytes()
+        assert image.tobytes() == nsg.render(scene).tobytes()
 
 
 def test_equal_frames_are_drawn_once(tmp_path: Path) -> None:

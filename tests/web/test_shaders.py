@@ -6,7 +6,6 @@ import base64
 import json
 import zlib
 from collections.abc import Iterator
-from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -20,11 +19,9 @@ from scenelang.assets.element_file import element_file_bytes
 from scenelang.assets.pyramid import unpacked
 from scenelang.compiler.groups import read_groups
 from scenelang.compiler.program import Program
-from scenelang.drawing.neural.coverage import Coverage, Tile, add_textures
 from scenelang.drawing.neural.draw import draw_objects
-from scenelang.drawing.neural.field import Field, Trace
+from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.files import load_arrays
-from scenelang.drawing.neural.meetings import Pairs, meetings_of
 from scenelang.drawing.small import draw_small
 from scenelang.drawing.solid.field import SolidField
 from scenelang.drawing.solid.network import EMPTY, SolidArrays
@@ -119,15 +116,7 @@ def asked(program: Program, p: np.ndarray) -> np.ndarray:
     """Distance and colour (M, 4) at points (M, 2) by the field, as precise as they are."""
     network, _ = load_arrays(program.model)
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())  # type: ignore[arg-type]
-    count = len(program)
-    pairs = Pairs.of(np.zeros(count, np.intp), np.arange(count))
-    meetings, _ = meetings_of(replace(pairs, far=np.ones(count, bool)))
-    tile = Tile(np.empty((1, 1, 4), np.float32), None)
-    coverage, points = Coverage(field, skip=False), np.ascontiguousarray(p.T)[:, :, None]
-    trace = Trace()
-    memory = coverage.ask(meetings, points, tile, trace)[2]
-    add_textures(field, meetings, trace, points, memory, np.ones((len(p), 1), bool))
-    found: np.ndarray = memory[:, :, 0]
+    found: np.ndarray = field.folded(np.ascontiguousarray(p.T))[0].T
     found[:, 0] /= field.unit
     return found
 

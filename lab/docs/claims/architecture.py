@@ -2,11 +2,9 @@
 
 from lab.docs.figures import Figure
 from scenelang.drawing.how import THREAD_PIXELS
-from scenelang.drawing.small import MOST_MS
 
 CLAIMS = [
     f"one thread for each {Figure(THREAD_PIXELS):,.0f} pixels",
-    f"numpy draws up to {Figure(MOST_MS)} ms",
 ]
 GIVEN = dict.fromkeys(
     (

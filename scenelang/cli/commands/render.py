@@ -398,9 +398,9 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
     assert program is not None
     from scenelang.drawing.small import choose_drawer
 
-    library, why = choose_drawer(program, how.device, how.care["samples"], exact=how.backend == "exact")
+    library, why = choose_drawer(program, how.device, exact=how.backend == "exact")
     if library == "numpy":
-        cores = how.threads or threads_for(program.canvas) if program.stage else 1
+        cores = how.threads or threads_for(program.canvas)
         device, place = "numpy", "one core" if cores == 1 else f"{cores} cores"
     else:
         with clock("load torch"):

@@ -18,7 +18,6 @@ from scenelang.compiler.program import Paint, ProgramError
 from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.image import decoded
 from scenelang.drawing.neural.frames import FrameMap
-from scenelang.drawing.neural.network import CELLS, NODE, RADII, RADIUS, STEEP, Slopes, around
 
 
 def blended(xp: Arrays, flat: Array, first: Array, share: Sequence[Array], corners: Sequence[int]) -> Array:
@@ -71,27 +70,13 @@ class GridShape(Lattice):
         beyond = (off * off).sum(0)
         return self.xp.select(beyond > 0, self.xp.sqrt(result * result + beyond), result)
 
-    def slopes(self) -> Slopes:
-        """Bounds of how fast the distance in the plane changes; infinite for grids that end inside."""
-        n, side = self.side, 2 * RADIUS / CELLS
-        grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(n, n)
-        rows, columns = (abs(np.diff(grid, axis=axis)) * self.half for axis in (0, 1))
-        # of each cell the largest slopes along x and along y: along each they change linearly over a cell
-        steep = np.hypot(np.maximum(rows[:, 1:], rows[:, :-1]), np.maximum(columns[1:], columns[:-1]))
+    def steepest(self) -> float:
+        """How fast the distance in the plane changes at most; infinite for grids that end inside."""
+        grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(self.side, self.side)
         if min(grid[[0, -1]].min(), grid[:, [0, -1]].min()) < 0:
-            steep = np.full_like(steep, np.inf)
-        first = np.clip((-RADIUS + side * np.arange(CELLS) + 1.0) * self.half, 0, n - 1)
-        last = np.clip((-RADIUS + side * np.arange(1, CELLS + 1) + 1.0) * self.half, 0, n - 1)
-        spans = [(int(a), max(int(np.ceil(b)), int(a) + 1)) for a, b in zip(first, last, strict=True)]
-        spans = [(min(a, n - 2), max(min(b, n - 1), min(a, n - 2) + 1)) for a, b in spans]
-        across = np.stack([steep[:, a:b].max(1) for a, b in spans], 1)
-        result = np.stack([across[a:b].max(0) for a, b in spans])
-        result = np.maximum(result.T, 1.0)  # outside, one along the way there
-        more = [
-            (around(result, int(np.ceil(radius / side))) - STEEP).clip(0.0) * np.hypot(radius, NODE)
-            for radius in RADII
-        ]
-        return Slopes(np.stack(more), 1.0)
+            return np.inf
+        most = [abs(np.diff(grid, axis=axis)).max() * self.half for axis in (0, 1)]
+        return max(1.0, float(np.hypot(*most)))
 
     def field(self, q: Array, gradient: bool) -> Array:
         """Distances (1, M), or these with their change over a cell (1 + d, M), which hides edges."""
@@ -123,9 +108,8 @@ class GrownShape(GridShape):
     point of the cube, along the surface to where it faces the point.
     """
 
-    def slopes(self) -> Slopes:
-        """Infinite bounds: nothing is proved of where guesses end."""
-        return Slopes(np.full((len(RADII), CELLS, CELLS), np.inf), np.inf)
+    def steepest(self) -> float:
+        return np.inf
 
     def distance(self, q: Array) -> Array:
         xp, inside = self.xp, q.clip(-1.0, 1.0)

@@ -1,15 +1,10 @@
-"""Programs to pictures and outputs: tiles and threads around coverage and rays.
-
-A tile's pixels depend on the objects that reach the tile, on nothing else, and in no way on how fast or
-where they are computed. Where all of those are, bit for bit, as in the picture before, so are the pixels.
-"""
+"""Programs to pictures and outputs: strips of rows of the plane, on threads, and rays through solids."""
 
 from __future__ import annotations
 
-import hashlib
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
-from dataclasses import field, replace
+from dataclasses import replace
 from typing import Unpack
 
 import numpy as np
@@ -17,82 +12,42 @@ import numpy.typing as npt
 
 from scenelang.assets.records import Record
 from scenelang.compiler.program import Program, ProgramError
-from scenelang.drawing.how import Care, OutOfTime
-from scenelang.drawing.image import Image, Outputs, enlarged, from_samples
-from scenelang.drawing.neural.coverage import Coverage, Tile
+from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.how import Care, OutOfTime, check_time
+from scenelang.drawing.image import Image, Outputs, enlarged, from_samples, sample_places
+from scenelang.drawing.kernel import load_kernel, there_is_a_kernel
+from scenelang.drawing.neural.assets import GridShape
 from scenelang.drawing.neural.field import Field
-from scenelang.drawing.neural.meetings import LEVELS
 from scenelang.drawing.neural.network import FramedNetwork
-from scenelang.drawing.size import growth, sized
+from scenelang.drawing.neural.outlines import OutlineShapes
+from scenelang.drawing.neural.tables import page_row, tables_of
+from scenelang.drawing.neural.units import LeafUnits
+from scenelang.drawing.size import sized
 from scenelang.drawing.solid.draw import draw_solids, solid_outputs
 from scenelang.drawing.solid.march import Work
 from scenelang.drawing.solid.network import SolidNetwork
 from scenelang.drawing.solid.plain import solid_field
 from scenelang.drawing.work import FIRST, Plan, late_plan, plan_of, until_s
 
-_ROOM_PX = 2.0  # around a tile: more than a sample lies off its pixel's centre
-
-
-class TileCache(Record, frozen=False):
-    """The last picture of a sequence."""
-
-    keys: list[bytes] = field(default_factory=list)  # what each of its tiles showed, a digest
-    # (H, W, 3 or 4), as `Tile` has it
-    picture: npt.NDArray[np.float32] = field(default_factory=lambda: np.empty((0, 0, 4), np.float32))
-
-    def shows(self, index: int, keys: list[bytes], shape: tuple[int, ...]) -> bool:
-        """True where a tile of a picture with such keys shows the same as before."""
-        return self.picture.shape == shape and len(self.keys) == len(keys) and self.keys[index] == keys[index]
-
-    def look(self, coverage: Coverage, program: Program, tiles: Sequence[range]) -> list[bytes]:
-        """A digest of what each tile of a new picture will show."""
-        width, height = program.canvas
-        px = 2 / min(width, height)  # world units
-        scene = coverage.field
-        reach, frames = scene.reach, scene.frames
-        low, high = frames.boxes(reach + _ROOM_PX * px * frames.growth)
-        low, high = (np.where(np.isinf(reach), end, y[1]) for end, y in ((-np.inf, low), (np.inf, high)))
-        brought = [held and held.digest for held in scene.brought]
-        paints = [held and (held.element.digest, held.steps) for held in scene.paints]
-        looks = [hashlib.sha256(repr(pair).encode()).digest() for pair in zip(brought, paints, strict=True)]
-        shown = (
-            *(scene.vectors, scene.xp.to_numpy(scene.colours).T, scene.tokens, reach),
-            np.frombuffer(b"".join(looks), np.uint8).reshape(-1, 32),
-            *scene.nests(),
-        )
-        common = (
-            repr((type(scene.xp).__name__, program.canvas, program.background, list(tiles))).encode()
-            + bytes([coverage.count])
-            + scene.codes.tobytes()
-        )
-        keys = []
-        for tile in tiles:
-            top = (height / 2 - tile.start + _ROOM_PX) * px
-            bottom = (height / 2 - tile.start - LEVELS[0] * -(-len(tile) // LEVELS[0]) - _ROOM_PX) * px
-            reaching = (low <= top) & (high >= bottom)
-            what = b"".join(part[reaching].tobytes() for part in shown)
-            keys.append(hashlib.sha256(common + what).digest())
-        return keys
-
 
 class Run(Care, total=False):
     """Arguments of a single drawing, which calls hand on to the renderer.
 
     Args:
-        threads: tiles drawn at the same time; by default as `threads_for` says.
+        threads: strips drawn at the same time; by default as `threads_for` says.
         split: threads that the picture is split for, which shows in the last bits; by default ``threads``.
-        kept: the picture before this one, of which tiles that show the same are taken over.
         progress: called with the share done, in [0, 1], from any thread.
         samples: as of `How`.
     """
 
     threads: int | None
     split: int | None
-    kept: TileCache | None
     progress: Callable[[float], None] | None
 
 
-TILE = 1 << 18  # pixels that are drawn at a time
+STRIP = 64  # rows that are drawn at a time
+WORK = 1 << 22  # pixels times objects between two looks at the clock
+PAIRS = 1 << 18  # of an object and a sample at a time, where the kernel does not draw
 
 
 class Drawing(Record, frozen=False):
@@ -151,7 +106,7 @@ def _drawn(
     ``"quick"``, as ``"adaptive"``, of solids with longer steps and fewer pixels sampled more than once.
     """
     if run.get("samples") == "draft":
-        run |= {"samples": "one", "split": None, "kept": None}
+        run |= {"samples": "one", "split": None}
         drawing = _drawn(network, halved(program), skip, even, run)
         return replace(drawing, image=enlarged(drawing.image, program.canvas))
     if network.layout.dimension == 2:
@@ -159,6 +114,7 @@ def _drawn(
             raise ProgramError("a program of solids, which the model does not draw")
         if run.get("samples") == "quick":
             run["samples"] = "adaptive"
+        run.pop("split", None)
         return draw(network, program, skip=skip, **run)  # type: ignore[arg-type,misc]
     if program.stage is None:
         raise ProgramError("a program of the plane, which the model does not draw")
@@ -182,47 +138,83 @@ def draw(
     program: Program,
     *,
     threads: int | None = None,
-    split: int | None = None,
-    kept: TileCache | None = None,
     skip: bool = True,
     samples: str = "adaptive",
-    tile: int = TILE,
     progress: Callable[[float], None] | None = None,
 ) -> Drawing:
     """Draw a Program's objects in stream order; arguments are those of `Run`.
 
-    Without ``split`` tiles are as high as for ``threads``, by default 1; ``tile`` is their pixels, at least
-    one row. Raises `ProgramError` for vectors that no compiled scene has.
+    The network as it is written, which draws by torch, or without ``skip``, takes all samples everywhere but
+    for ``"one"``. Raises `ProgramError` for vectors that no compiled scene has.
     """
-    (width, height), threads = program.canvas, threads or 1
+    (width, height), count = program.canvas, program.samples
     field = Field(network, program.vectors, program.tokens, program.brought(), program.paints())
-    coverage = Coverage(field, skip=skip, count=program.samples)
-    rows = max(1, min(tile // width, -(-height // (split or threads))))
-    rows = LEVELS[0] * -(-rows // LEVELS[0])
-    tiles = [range(top, min(top + rows, height)) for top in range(0, height, rows)]
     background = None if program.background is None else np.asarray(program.background, np.float32)
     out = np.empty((height, width, 4 if background is None else 3), np.float32)
-    drawn: list[Tile] = []
-    finished: list[int] = []
-    seen = kept.look(coverage, program, tiles) if kept is not None and skip and samples != "four" else None
+    by_kernel = skip and draws(field)
+    if by_kernel:
+        tables, page = tables_of(field), page_row(program.canvas, count, samples, background)
+    places = sample_places(1 if samples == "one" else count) - 0.5
+    strips = [range(top, min(top + STRIP, height)) for top in range(0, height, STRIP)]
+    costs: list[tuple[int, ...]] = []
+    often = max(1, WORK // (STRIP * width * (1 + len(program))))  # strips for each look at the clock
 
-    def one(index: int) -> None:
-        band = tiles[index]
-        if kept is not None and seen is not None and kept.shows(index, seen, out.shape):
-            out[band.start : band.stop] = kept.picture[band.start : band.stop]
+    def one(strip: range) -> None:
+        if strip.start // STRIP % often == 0:
+            check_time(network.until_s)
+        if by_kernel:
+            part = out[strip.start : strip.stop]
+            costs.append(load_kernel().plane(tables, page, strip, part))
         else:
-            result = coverage.tile(program.canvas, band, samples, background)
-            out[band.start : band.stop] = result.picture
-            drawn.append(result)
-        finished.append(index)
+            picture = _written(field, program.canvas, strip, places, skip)
+            behind = 0.0 if background is None else (1 - picture[..., 3:]) * background
+            out[strip.start : strip.stop] = picture[..., : out.shape[2]] + behind
+            pixels = len(strip) * width
+            costs.append((pixels * places.shape[1] * len(program), pixels * (samples != "one"), pixels))
         if progress is not None:
-            progress(len(finished) / len(tiles))
+            progress(len(costs) / len(strips))
 
-    network.xp.each(threads, one, range(len(tiles)))
-    if kept is not None and seen is not None:
-        kept.picture, kept.keys = out.copy(), seen
-    cost = [sum(getattr(t, name) for t in drawn) for name in ("pairs", "refined", "met")]
-    return Drawing(as_image(out), *cost)
+    network.xp.each(threads or 1, one, strips)
+    # the kernel's numbers lie in [0, 1]
+    image: Image = out.view(Image) if by_kernel and background is not None else as_image(out)
+    pairs, refined, met = map(sum, zip(*costs, strict=True))
+    return Drawing(image, pairs, refined, met)
+
+
+def draws(field: Field) -> bool:
+    """Whether the kernel draws a field of the plane: norm units of numpy, and what users brought."""
+    config, known = field.network.config, (LeafUnits, GridShape, OutlineShapes)
+    sizes = config.features, config.state, config.paint_lines
+    kinds = all(isinstance(field.shapes[at], known) for at in set(field.shape.tolist()))
+    return field.xp is NUMPY and sizes == (1, 1, 2) and kinds and there_is_a_kernel()
+
+
+def _written(
+    field: Field, canvas: tuple[int, int], strip: range, places: npt.NDArray[np.float64], skip: bool
+) -> npt.NDArray[np.float32]:
+    """Rows of a picture (rows, width, 4) by the network as it is written, of samples at places (2, K) about
+    pixels' middles; if ``skip``, of the objects that may reach a part of the rows.
+    """
+    (width, height), xp = canvas, field.xp
+    px, each = 2 / min(width, height), STRIP
+    result = np.empty((len(strip), width, 4), np.float32)
+    for left in range(0, width, each):
+        columns = np.arange(left, min(left + each, width))
+        x = (columns + 0.5 - width / 2) * px
+        y = (height / 2 - 0.5 - np.arange(strip.start, strip.stop)) * px
+        room = np.array([px, px])
+        box = np.array([x[0], y[-1]]) - room, np.array([x[-1], y[0]]) + room
+        objects = field.within(*box) if skip else np.arange(len(field.tokens))
+        p = np.stack(np.broadcast_arrays(x[None], y[:, None])).reshape(2, -1).astype(np.float32)
+        some = max(1, PAIRS // max(1, len(objects)))
+        parts = []
+        for first in range(0, p.shape[1], some):
+            check_time(field.network.until_s)
+            with xp.inference():
+                points = xp.array(np.ascontiguousarray(p[:, first : first + some]), field.like)
+                parts.append(xp.to_numpy(field.sampled(points, (places * px).astype(np.float32), objects)))
+        result[:, columns] = np.concatenate(parts, 1).T.reshape(len(y), len(x), 4)
+    return result
 
 
 def halved(program: Program) -> Program:
@@ -250,17 +242,36 @@ def program_outputs(
 
 def _outputs(network: FramedNetwork | SolidNetwork, program: Program, threads: int) -> Outputs:
     if program.stage is not None:
-        by, program = growth(program.stage), sized(program)
+        by, program = program.stage.growth, sized(program)
         solids = solid_field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
         result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
         assert result.depth is not None
         result = replace(result, depth=result.depth / np.float32(by))
     else:
-        image = draw(network, replace(program, background=None)).image  # type: ignore[arg-type]
+        image = draw(network, replace(program, background=None), threads=threads).image  # type: ignore[arg-type]
         field = Field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
-        coverage, rows = Coverage(field, prove=False), max(1, TILE // program.canvas[0])
-        bands = [range(program.canvas[1])[top : top + rows] for top in range(0, program.canvas[1], rows)]
-        owners = np.concatenate([coverage.owners(program.canvas, band) for band in bands])
+        owners = _owners(field, program.canvas)
         result = Outputs(object=owners, alpha=np.asarray(image)[..., 3])
     assert result.object is not None
     return replace(result, object=np.array((0, *program.numbers), np.int32)[result.object])
+
+
+def _owners(field: Field, canvas: tuple[int, int]) -> npt.NDArray[np.int32]:
+    """Numbers (H, W), from 1, of the objects that paint pixels' centres, 0 where none does."""
+    (width, height), px = canvas, 2 / min(canvas)
+    result = np.empty((height, width), np.int32)
+    if draws(field):
+        tables, page = tables_of(field), page_row(canvas, 4, "owners")
+        for top in range(0, height, STRIP):
+            check_time(field.network.until_s)
+            strip = range(top, min(top + STRIP, height))
+            load_kernel().plane(tables, page, strip, result[strip.start : strip.stop])
+        return result
+    x = ((np.arange(width) + 0.5 - width / 2) * px).astype(np.float32)
+    for row in range(height):
+        check_time(field.network.until_s)
+        y = np.full_like(x, (height / 2 - 0.5 - row) * px)
+        with field.xp.inference():
+            points = field.xp.array(np.stack([x, y]), field.like)
+            result[row] = field.xp.to_numpy(field.folded(points, owners=True)[1])
+    return result

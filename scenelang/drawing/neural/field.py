@@ -1,70 +1,33 @@
-"""The framed renderer's field: what it answers at points, whoever asks and by whichever library.
+"""The plane's field: a Program's objects with their weights, and the network as it is written over arrays of
+either library, every object at every point: torch draws by it, and what the kernel does not know.
 
 Letters are those of `network.py`. Each object's frame (`frames.py`) carries points into its own space, where
-the network meets them. All pairs of an object and a point are carried and decoded together, however many
-objects they are of; then the cell takes a point's objects in one by one. Nothing here knows a pixel.
+its decoder answers; then the cell takes a point's objects in one by one. Nothing here knows a pixel.
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 
 from scenelang.assets.element import Element
 from scenelang.compiler.groups import OPERATOR, SMOOTH, UNION, anchored, felt, read_groups, widths_of
 from scenelang.compiler.program import Paint, ProgramError
-from scenelang.drawing.arrays import Array, Arrays
+from scenelang.drawing.arrays import Array
 from scenelang.drawing.neural.assets import GridShape, Texture, grid_shape, texture_of
-from scenelang.drawing.neural.frames import FAR, Floats, Frames, read_skins
-from scenelang.drawing.neural.meetings import Interval, Meetings, NestedSlot, Nesting, Shown, nesting, shown
-from scenelang.drawing.neural.network import EMPTY, RADIUS, Cell, Decoder, FramedNetwork
-from scenelang.drawing.neural.outlines import OutlineShapes, true_slopes
+from scenelang.drawing.neural.frames import FAR, Frames, read_skins
+from scenelang.drawing.neural.network import EMPTY, Cell, Decoder, FramedNetwork
+from scenelang.drawing.neural.outlines import OutlineShapes
 
 SLACK = 0.02  # leaf units by which a learned outline may leave the unit disc
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
 FARTHER = 1.3  # widths of a blend at which objects cannot change where its outline lies
 FARTHEST = 3.0  # widths at which they cannot by any number of blends, but for 10⁻⁶ world units
 CHUNK = 4096  # points that go through a decoder at once: fewer cost calls, more cost caches
-ROUNDING = 1e-4, 2e-6  # leaf units, and share of a distance and world units, by which float32 may be off
 NO_TEXTURE = -1
 ROUNDED = 3  # from the index of a cut to that of the same cut with a rounded edge, see `rounded`
-_UNKNOWN = 1e9  # world units: how far off a distance may be of which nothing is proved
-
-
-class Met(NamedTuple):
-    """A turn and what came of it at points, (groups, n) each."""
-
-    turn: NestedSlot
-    rows: np.ndarray  # (n,) numbers of the objects, behind these of the groups
-    distance: Array  # world units
-    paint: Array  # how far the colour came in
-    margin: Array  # by how much what was there before is nearer, world units
-    through: Array | None  # how much is seen through it, None where nothing is
-
-
-class Trace(list[Met]):
-    """Effects of the turns of pairs on points."""
-
-    def none(self) -> Array:
-        """A mask of columns (groups, B), all False."""
-        return 0.0 * self[0].paint > 0  # in the first turn all columns meet an object
-
-    def shares(self, xp: Arrays, nest: Nesting, seen: Array, pairs: int) -> Array:
-        """Share of each object's colour (groups, P) that is left when all are met, 0 at points not seen."""
-        result, seen = xp.full((len(seen), pairs), 0.0, self[0].paint), 1.0 * seen
-        left = xp.concat([seen, xp.full((len(seen), nest.states - seen.shape[1]), 0.0, seen)], 1)
-        for turn, *_, paint, _, through in reversed(self):
-            rest = left[:, turn.at]
-            into, at = (result, turn.which) if turn.ending is None else (left, turn.ending)
-            into[:, at], left[:, turn.at] = rest * paint, rest * _left(paint, through)
-        return result
-
-
-def _left(paint: Array, through: Array | None) -> Array:
-    """Share of what was before that is left behind an object that came in by ``paint``."""
-    return 1.0 - paint if through is None else 1.0 - paint * (1.0 - through)
 
 
 class Field:
@@ -77,6 +40,8 @@ class Field:
     hold colours, and if some objects are ``clear`` premultiplied ones, with their coverage. Raises
     `ProgramError` where a vector holds no way to a leaf, or an element cannot be drawn.
     """
+
+    tables: Any = None  # those of the kernel, once it was asked
 
     def __init__(
         self,
@@ -120,8 +85,6 @@ class Field:
         learned = network.decoders(xp.array(codes, self.like))
         self.shapes: list[Any] = [*learned]
         """Decoders, grids and outlines."""
-        self.slopes: list[Any] = [None if isinstance(shape, Decoder) else shape for shape in learned]
-        """Bounds for each on how far distances differ within a radius, None where nothing is known."""
         more = () if self.skins is None else np.flatnonzero(self.skins.reach > 0).tolist()
         grown = {self.brought[i] for i in more}
         elements = dict.fromkeys(element for element in self.brought if element is not None)
@@ -134,11 +97,9 @@ class Field:
             if element not in outlines:
                 self.shape[[held == element for held in self.brought]] = len(self.shapes)
                 self.shapes.append(grid_shape(element, xp, self.like, element in grown))
-                self.slopes.append(self.shapes[-1].slopes())
         if outlines:
             self.shape[self.outline >= 0] = len(self.shapes)
             self.shapes.append(OutlineShapes(xp, [*outlines], self.like))
-            self.slopes.append(true_slopes())
 
     def _cells(self) -> None:
         """Cells by operator and width of the blend; behind them the same with gates that are open."""
@@ -159,19 +120,16 @@ class Field:
         # in a block a row may hide all before it in its group, and be out of reach in a part of the block
         self.reach = np.where(seen.everywhere | anchored(groups), np.inf, 1.0 + SLACK + beyond)
         blends = [*np.where(groups.first, 0.0, widths).tolist(), *self.group_widths.tolist()]
-        kinds, self._kinds = _numbered(list(zip(self.operators.tolist(), blends, strict=True)))
+        kinds, which = _numbered(list(zip(self.operators.tolist(), blends, strict=True)))
         cells = Cell(*(np.asarray(xp.to_numpy(part)) for part in self.network.cell_weights()))
         # The fold of s d and s D is s D', so that the cell's own width is that of any other.
         scale = np.array([BLEND / (width or BLEND) for _, width in kinds], np.float32)
         shown = [kind if kind == SMOOTH or not width else kind + ROUNDED for kind, width in kinds]
-        lines, bias, candidate, bump = (part[shown].T for part in rounded(cells, self.network.config.state))
-        lines, candidate = lines.swapaxes(0, 1), candidate.swapaxes(0, 1)
-        table = Cell(lines * scale, bias, candidate, bump[0] / scale)
-        opened = Cell(np.zeros_like(lines), np.ones_like(bias), candidate, np.zeros_like(bump[0]))
-        host = [np.concatenate(pair, -1).astype(np.float32) for pair in zip(table, opened, strict=True)]
-        self._opened = len(kinds)
-        self._table = Cell(*(xp.array(part, self.like) for part in host))
-        self._host = Cell(*host)
+        lines, bias, candidate, bump = (part[shown] for part in rounded(cells, self.network.config.state))
+        scale = scale[:, None, None]
+        table = Cell(lines * scale, bias, candidate, bump / scale)
+        self.cells = Cell(*(part[which].astype(np.float32) for part in table))
+        """Cells of all objects and, behind these, groups, which come first, on the host."""
 
     def _colours(self) -> None:
         xp, parts = self.xp, self.parts
@@ -211,21 +169,6 @@ class Field:
     def nothing(self) -> float:
         """The state of points that have met nothing."""
         return float(EMPTY * self.widest / BLEND)
-
-    def cells(self, objects: np.ndarray, opened: bool = False) -> Cell:
-        """Cells of objects, which come last, on the host; with gates that are open if asked for."""
-        return Cell(*(part.take(self._kinds[objects] + self._opened * opened, -1) for part in self._host))
-
-    def joins(self) -> Cell:
-        """Cells of all groups, which come last, on the host."""
-        return Cell(*(part.take(self._kinds[len(self.tokens) :], -1) for part in self._host))
-
-    def empty(self, groups: int, count: int, more: int = 0) -> Array:
-        """State and register (groups, S + R, count) of points that have met nothing, with room for more."""
-        size = self.network.config.state + self.register + more
-        memory = self.xp.full((groups, size, count), 0.0, self.like)
-        memory[:, 0] = self.nothing
-        return memory
 
     def features(self, objects: np.ndarray, q: Array, far: np.ndarray) -> Array:
         """Features (groups, F, P) in world units of objects (P,) at leaf coordinates (2, groups, P); ``far``
@@ -271,130 +214,110 @@ class Field:
             parts.append(self.network.decode(part, radius, 1.0, shape))
         return parts[0] if len(parts) == 1 else self.xp.concat(parts, 1)
 
-    def nests(self) -> tuple[np.ndarray, ...]:
-        """The groups around each object (N, D), their operators and widths, -1 for none."""
-        path, joins = self.groups.path, np.append(self.groups.joins, -1)
-        return path, joins[path], np.append(self.group_widths, -1.0)[path]
+    def within(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Numbers of the objects that may change something in a box of the world (2,), (2,)."""
+        every = np.isinf(self.reach)
+        least, most = self.frames.boxes(np.where(every, 0.0, self.reach))
+        # a box of what are no numbers is everywhere
+        aside = ((least > high[:, None]) | (most < low[:, None])).any(0)
+        return np.flatnonzero(every | ~aside)
 
-    def fold(self, meetings: Meetings, features: Array, trace: Trace | None = None) -> Array:
-        """State and register (groups, S + R, B) of columns that have met their objects, by the features
-        (groups, F, P) of the pairs; ``trace`` takes down what each object did.
+    def folded(
+        self, p: Array, objects: np.ndarray | None = None, owners: bool = False
+    ) -> tuple[Array, Array]:
+        """State and register (S + R, M) of points (2, M) that have met some objects, by default all, and the
+        numbers (M,), from 1, of those that show most there, if asked for; else 0.
         """
-        xp, s, pairs = self.xp, self.network.config.state, meetings.pairs
-        nest, count = nesting(meetings, self.groups), len(self.tokens)
-        starts = [turn.fresh for turn in nest.turns if turn.ending is None]
-        fresh = np.concatenate([pairs.open[:0], *starts]) | pairs.open
-        groups, more = features.shape[0], int(trace is not None)
-        stack = self.empty(groups, nest.states, more)
-        every = self._cells_at(self._kinds[pairs.object] + self._opened * fresh)
-        colours = xp.take(self.colours, xp.array(pairs.object, self.like))
-        if trace is not None:  # a colour of 1 over a register of 0 shows the gate
-            colours = xp.concat([colours, 0.0 * colours[:1] + 1.0], 0)
-        over = self._over(self.tokens[pairs.object], fresh)
+        every = np.arange(len(self.tokens)) if objects is None else objects
+        if not len(every):
+            return self.fold(p[:, None], every, owners=owners)
+        q = self.frames.local(self.xp, every, p[:, :, None] + self.xp.full((1, 1, len(every)), 0.0, p))
+        return self.fold(self.features(every, q, np.ones(len(every), bool)).swapaxes(0, 2), every, q, owners)
 
-        def put(index: Array, values: Array) -> None:
-            for plane, new in zip(stack, values, strict=True):
-                xp.put(plane, index, new)
+    def fold(
+        self, d: Array, every: np.ndarray, q: Array | None = None, owners: bool = False
+    ) -> tuple[Array, Array]:
+        """As `folded`, by features (N, F, M) of the objects and, for textures, leaf coordinates (2, M, N)."""
+        xp, groups, s = self.xp, self.groups, self.network.config.state
+        count = d.shape[-1]
+        blank = xp.full((s + self.register + 2, count), 0.0, d)
+        blank[0] = self.nothing
+        stack, met = [blank], [False]
+        path: list[int] = []
 
-        for turn in nest.turns:
-            which, at = turn.which, turn.at
-            index = at if isinstance(at, slice) else xp.array(at, self.like)
-            old = stack[..., at] if isinstance(at, slice) else xp.take(stack, index)
-            if turn.ending is None:
-                rows, d, own = pairs.object[which], features[..., which], colours[:, which]
-                cell = Cell(*(part[..., which] for part in every))
-                lies = over if over is None else over[which]
-            else:  # groups that end join as objects
-                top = xp.array(turn.ending, self.like)
-                ended, rows = xp.take(stack, top), count + which
-                if trace is not None:
-                    ended[:, -1] = 1.0
-                d, own = ended[:, :s] / self.unit, ended[:, s:]
-                cell, lies = self._cells_at(self._kinds[rows]), self._over(self.operators[rows])
-                put(top, self.empty(groups, len(ended[0, 0]), more))
-            took = self._took(old, cell, d, own, trace is not None, lies)
-            if not isinstance(at, slice):
-                put(index, old)
-            if trace is not None:
-                trace.append(Met(turn, rows, d[:, 0], *took))
-        return stack[:, : s + self.register, : len(meetings.columns)]
+        def join(row: int, operand: tuple[Array, Array, Array], at: int) -> None:
+            fresh = not met[at] and self.operators[row] <= SMOOTH
+            stack[at], met[at] = self._joined(stack[at], row, operand, fresh, owners), True
 
-    def _over(self, operators: np.ndarray, fresh: np.ndarray | None = None) -> Array | None:
-        """1 for operands (n,) that lie over what was before, 0 for others; None where none is clear."""
-        if not self.clear:
-            return None
-        over = operators == UNION
-        return self.xp.array((over if fresh is None else over & ~fresh).astype(np.float32), self.like)
+        def end(kept: int) -> None:
+            while len(path) > kept:
+                top = stack.pop()
+                met.pop()
+                operand = top[:s] / self.unit, top[s : s + self.register], top[s + self.register :]
+                join(len(self.tokens) + path.pop(), operand, len(path))
 
-    def _cells_at(self, kinds: np.ndarray) -> Cell:
-        index = self.xp.array(kinds, self.like)
-        return Cell(*(self.xp.take(part, index) for part in self._table))
+        for at, row in enumerate(every.tolist()):
+            own = [group for group in groups.path[row].tolist() if group >= 0]
+            common = 0
+            while common < min(len(own), len(path)) and own[common] == path[common]:
+                common += 1
+            end(common)
+            for group in own[common:]:
+                path.append(group)
+                stack.append(blank)
+                met.append(False)
+            colour = self.colours[:, row, None] + xp.full((1, count), 0.0, d)
+            if q is not None and (texture := self.texture[row]) != NO_TEXTURE:
+                shown = self.textures[texture].at(q[:, :, at]) * float(self.opacity[row])
+                colour = xp.concat([shown, colour[3:]], 0)
+            shows = xp.full((2, count), float(self.opacity[row]), d)
+            shows[0] = float(row + 1)
+            join(row, (d[at], colour, shows), len(path))
+        end(0)
+        result = stack[0][: s + self.register]
+        covered = result[0] * self.slope < 0.0
+        return result, stack[0][-2] * covered if owners else 0
 
-    def _took(
-        self, memory: Array, cell: Cell, d: Array, colours: Array, traced: bool, over: Array | None
-    ) -> tuple[Array, Array, Array]:
-        """Let memories (groups, S + R, n) take an object in each; how far its colour came in, the margin, and
-        how much is seen through it. ``d`` are features (groups, F, n), colours registers (R, n) or (groups,
-        R, n), ``over`` as of `_over`.
+    def _joined(
+        self, memory: Array, row: int, operand: tuple[Array, Array, Array], fresh: bool, owners: bool
+    ) -> Array:
+        """The memory (S + R + 2, M) that takes in an operand: features (F, M), a register (R, M), and whose
+        it is (2, M) and how much that shows; as it is where it is ``fresh``.
         """
-        s, (lines, bias, candidate, bump) = self.network.config.state, cell
-        levels, wanted = bias, 0.0
-        for i in range(d.shape[1]):
-            levels = levels + d[:, i : i + 1] * lines[:, i]
-            wanted = wanted + d[:, i : i + 1] * candidate[:, i]
-        for i in range(s):
-            levels = levels + memory[:, i : i + 1] * lines[:, d.shape[1] + i]
-        paint = margin = through = None
-        if traced:
-            margin = memory[:, 0] / self.unit - d[:, 0]
-            memory[:, -1] = 0.0
-        if over is not None:  # a union shows what it covers, through what is clear of it
-            through = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0) * over * (1.0 - colours[..., 3:4, :])
-            colours = colours + through * memory[:, s:]
-            through = through[:, 0]
-        new = self.network.update(levels, wanted, bump, memory[:, :s], memory[:, s:], colours)
-        memory[:, :s], memory[:, s:] = new
-        if traced:
-            paint = memory[:, -1] + 0.0
-        return paint, margin, through
+        xp, s, end = self.xp, self.network.config.state, self.network.config.state + self.register
+        d, colour, shows = operand
+        lines, bias, candidate, bump = (xp.array(part[row], self.like) for part in self.cells)
+        wanted = candidate @ d
+        if fresh:
+            return xp.concat([wanted, colour, shows], 0)
+        state, register, own = memory[:s], memory[s:end], memory[end:]
+        levels = lines @ xp.concat([d, state], 0) + bias[:, None]
+        through = 0.0
+        if self.clear and self.operators[row] == UNION:
+            # a union shows what it covers, through what is clear of it
+            through = (0.5 - state[:1] * self.slope).clip(0.0, 1.0) * (1.0 - colour[3:])
+            colour = colour + through * register
+        new = self.network.update(levels, wanted, bump, state, register, colour)
+        if owners:
+            share = xp.largest(levels[s:]).clip(0.0, 1.0)
+            comes = (share > 0.5) & (shows[1:] >= through * own[1:])
+            kept = xp.concat([own[:1], own[1:] * (1.0 - share * (1.0 - through))], 0)
+            shows = xp.concat([shows[:1], shows[1:] * share], 0)
+            own = xp.select(comes, shows, kept)
+        return xp.concat([*new, own], 0)
 
     def picture(self, memory: Array) -> Array:
-        """Premultiplied colour and coverage (groups, 4, B), in [0, 1], of points that met all objects."""
-        coverage = (0.5 - memory[:, :1] * self.slope).clip(0.0, 1.0)
-        shown = memory[:, self.network.config.state :] * coverage
-        return shown if self.clear else self.xp.concat([shown, coverage], 1)
+        """Premultiplied colour and coverage (4, M), in [0, 1], of points that met all objects."""
+        coverage = (0.5 - memory[:1] * self.slope).clip(0.0, 1.0)
+        shown = memory[self.network.config.state :] * coverage
+        return shown if self.clear else self.xp.concat([shown, coverage], 0)
 
-    def middles(self, objects: np.ndarray, q: Floats) -> np.ndarray:
-        """World distances (P,) at leaf coordinates (2, P)."""
-        seen = np.nan_to_num(q).clip(-FAR, FAR)
-        far = np.full(len(objects), bool((np.hypot(*seen) > RADIUS).any()))
-        points = self.xp.array(seen.astype(np.float32)[:, None], self.like)
-        result: np.ndarray = self.xp.to_numpy(self.features(objects, points, far))[0, 0]
-        return result
-
-    def rise(self, objects: np.ndarray, q: Floats, radius: Floats) -> np.ndarray:
-        """Greatest difference (P,) of world distances at leaf coordinates from those within radii (P,)."""
-        result, shape = np.full(len(objects), np.inf), self.shape[objects]
-        for at, slopes in enumerate(self.slopes):
-            here = np.flatnonzero(shape == at)
-            if slopes is not None and len(here):
-                result[here] = slopes.rise(q.take(here, -1), radius[here])
-        most = np.fmin((result + ROUNDING[0]) * self.frames.scale[objects], _UNKNOWN)
-        return np.asarray(most, np.float32)
-
-    def proved(self, meetings: Meetings, middle: np.ndarray, rise: np.ndarray) -> Shown:
-        """Prove the pictures of blocks whose pairs' distances lie within ``rise`` of ``middle``."""
-        objects = meetings.pairs.object
-        cell = self.cells(objects)
-        dark = np.asarray(self.xp.to_numpy(self.colours)).take(objects, -1)
-        colours = Interval(dark, np.where(self.texture[objects] == NO_TEXTURE, dark, self.opacity[objects]))
-        lies = [tokens == UNION for tokens in (self.tokens[objects], self.groups.joins)]
-        with np.errstate(all="ignore"):
-            rise = rise + np.float32(ROUNDING[1]) * (1 + abs(middle))
-            distance = Interval(middle - rise, middle + rise)
-            nest = nesting(meetings, self.groups)
-            fold = distance, cell, colours, self.nothing, self.slope, nest, self.joins()
-            return shown(meetings, *fold, lies if self.clear else None)
+    def sampled(self, p: Array, offsets: np.ndarray, objects: np.ndarray | None = None) -> Array:
+        """Mean pictures (4, M) of samples at offsets (2, K) around points (2, M)."""
+        total: Array = 0.0
+        for offset in offsets.T:
+            total = total + self.picture(self.folded(p + self.xp.array(offset[:, None], p), objects)[0])
+        return total / offsets.shape[1]
 
 
 def rounded(cells: Cell, s: int) -> Cell:

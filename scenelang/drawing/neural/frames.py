@@ -110,15 +110,22 @@ class Frames:
         self._more = np.where(outer, [across * moved, along * moved], [zero, zero])
         self.wild = (largest > TAME) | ~((self.scale > 1 / TAME) & (self.scale < TAME))
 
-    @property
-    def growth(self) -> Floats:
-        """Most leaf units (N,) by which a point moves in each object's leaf as it moves by a world unit."""
-        return self.stretch / self.scale
-
     def boxes(self, radius: Floats) -> tuple[Floats, Floats]:
         """Corners (2, N) of world boxes outside which leaf coordinates are longer than radii (N,)."""
         half = self._slope * radius + self._more
         return self._centre - half, self._centre + half
+
+    def steps(self, dtype: Any) -> tuple[np.ndarray, np.ndarray]:
+        """Rows of all maps (kind 0) and turns (1) that move something, objects in turn, and how many each has
+        (N,).
+        """
+        rows = np.zeros((self.numbers.shape[1], len(self._stages)), dtype)
+        there = np.stack([stage.moves for stage in self._stages], 1)
+        for at, stage in enumerate(self._stages):
+            numbers = self.numbers[stage.numbers]
+            rows["kind"][:, at], rows["number"][:, at, : len(numbers)] = len(numbers) == STRENGTHS, numbers.T
+            rows["steep"][:, at], rows["rate"][:, at] = stage.steep, stage.rate
+        return rows[there], there.sum(1).astype(np.int32)
 
     def local(self, xp: Arrays, objects: np.ndarray, p: Array) -> Array:
         """Leaf coordinates (2, ..., P) of world points (2, ..., P), a column for each of the objects (P,)."""

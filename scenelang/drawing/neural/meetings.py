@@ -1,16 +1,13 @@
-"""Blocks of pixels, the objects that they meet, and proofs of their colours.
+"""Blocks of pixels, the objects that they meet, and intervals of what they show, for proofs of pictures.
 
 A pair is an object at a block. Blocks with the most objects are the first columns; then all pairs that come
 first at their block, all that come second, and so on: each of these slots is as long as there are columns
 with so many objects, and column i is its i-th pair.
-
-A proof folds intervals, in float32 on the host. Its distances are widened beforehand by more than the
-rounding error of float32.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
+from collections.abc import Callable
 from dataclasses import replace
 from itertools import pairwise
 from typing import Any, NamedTuple, Self
@@ -21,7 +18,6 @@ import numpy.typing as npt
 from scenelang.assets.records import Record
 from scenelang.compiler.groups import SMOOTH, Groups
 from scenelang.drawing.neural.frames import Floats, Frames
-from scenelang.drawing.neural.network import Cell
 
 Index = npt.NDArray[np.intp]
 Mask = npt.NDArray[np.bool_]
@@ -32,25 +28,19 @@ class Pairs(Record):
 
     block: Index  # (P,)
     object: Index  # (P,)
-    open: Mask  # (P,) whether what the block met before is proved not to matter
-    far: Mask  # (P,) whether points of the block may be seen at the rim of what the decoder knows
-    # (P,) how many leaf units two points of the block may be apart, per world unit
-    rate: npt.NDArray[np.float64]
 
     def __len__(self) -> int:
         return len(self.block)
 
     def take(self, index: npt.NDArray[np.generic]) -> Pairs:
         """Some of the pairs, or all in another order."""
-        parts = self.block, self.object, self.open, self.far, self.rate
-        return Pairs(*(part[index] for part in parts))
+        return Pairs(self.block[index], self.object[index])
 
     @classmethod
     def of(cls, block: Index, objects: Index) -> Pairs:
-        """Pairs of which nothing else is known, sorted by block."""
+        """Pairs sorted by block."""
         by = np.argsort(block, kind="stable")
-        none = np.zeros(len(by), bool)
-        return cls(block[by], objects[by], none, none, np.full(len(by), np.inf))
+        return cls(block[by], objects[by])
 
     def split(self, wide: int, parts: int) -> Pairs:
         """The same pairs in blocks smaller in both directions by a factor, of ``wide`` in a row."""
@@ -241,134 +231,6 @@ class State(NamedTuple):
             side[:, columns] = now + choose(share.low * more, share.high * more)
 
 
-class Shown(Record):
-    """Facts that are proved of blocks."""
-
-    picture: Interval  # premultiplied colour and coverage (4, B)
-    shut: Mask  # (P,) objects that change nothing in their block
-    open: Mask  # (P,) ones that hide all before them
-
-
-def shown(
-    meetings: Meetings,
-    distance: Interval,
-    cell: Cell,
-    colours: Interval,
-    empty: float,
-    slope: float,
-    nest: Nesting,
-    joins: Cell,
-    lies: Sequence[Mask] | None = None,
-) -> Shown:
-    """Fold intervals, of a network whose state is one number and that knows one feature.
-
-    Distances (P,), world units, and colours (R, P) are of the pairs. Cells, of the pairs and of the groups,
-    come last in their arrays. ``empty`` is the state before the first object, ``slope`` that of coverage per
-    world unit; ``lies`` says which pairs and groups lie over what was before, if some are clear.
-    """
-    blocks, given = len(meetings.columns), meetings.pairs.open
-    state = _Learned.empty(empty, nest.states, channels=len(colours.low))
-    operands = State(distance, colours)
-    fresh = np.concatenate([given[:0], *(turn.fresh for turn in nest.turns if turn.ending is None)])
-    gates = _Gates.of(cell, distance, given | fresh, None if lies is None else lies[0], slope)
-
-    def join(turn: NestedSlot) -> tuple[Mask, Mask]:
-        which, operand = turn.which, state.operands(turn, operands, empty)
-        if turn.ending is None:
-            keeps, hides = state.join(turn.at, operand, gates.some(which))
-            return keeps, hides | given[which]
-        cells, lie = Cell(*(x[..., which] for x in joins)), None if lies is None else lies[1][which]
-        return state.join(turn.at, operand, _Gates.of(cells, operand.distance, turn.fresh, lie, slope))
-
-    shut, wide = nest.fold(len(given), join)
-    low, high = (side[:blocks] for side in state.distance)
-    covered = Interval((0.5 - slope * high).clip(0.0, 1.0), (0.5 - slope * low).clip(0.0, 1.0))
-    sides = [(c[:, :blocks] * share, share) for c, share in zip(state.colour, covered, strict=True)]
-    picture = Interval(*(np.vstack(side) if lies is None else side[0] for side in sides))
-    return Shown(picture, shut, wide)
-
-
-class _Gates(NamedTuple):
-    """Gates of n operands: levels (rows, n) by their own distances, inf if open, and slopes by the state's;
-    the first one's line and the rest of the cell; and which lie over what was before, if some are clear, with
-    the slope of coverage.
-    """
-
-    low: Floats32
-    high: Floats32
-    up: Floats32
-    down: Floats32
-    line: Floats32  # (2, n)
-    bias: Floats32
-    candidate: Floats32
-    bump: Floats32
-    given: Mask
-    over: Mask | None
-    slope: float
-
-    @classmethod
-    def of(cls, cell: Cell, d: Interval, given: Mask, over: Mask | None, slope: float) -> _Gates:
-        # ends are never averaged, as a wide interval's middle would swallow the digits of its nearer end
-        up, down = np.maximum(cell.lines, 0.0), np.minimum(cell.lines, 0.0)
-        low = up[:, 0] * d.low + down[:, 0] * d.high + cell.bias
-        high = up[:, 0] * d.high + down[:, 0] * d.low + cell.bias
-        low[:, given] = high[:, given] = np.inf
-        rest = cell.lines[0], cell.bias[0], cell.candidate[0, 0], cell.bump[0]
-        over = None if over is None else over & ~given
-        return cls(low, high, up[:, 1], down[:, 1], *rest, given, over, slope)
-
-    def some(self, which: slice | Index) -> _Gates:
-        """Select some of the operands."""
-        over = None if self.over is None else self.over[which]
-        parts: Any = *(part[..., which] for part in self[:-2]), over, self.slope
-        return _Gates(*parts)
-
-    def through(self, state: Interval, coverage: Interval) -> Interval | None:
-        """How much is seen through operands of a coverage (n,), of states (n,) before them."""
-        if self.over is None:
-            return None
-        ends = [(0.5 - self.slope * d, 1.0 - c) for d, c in zip(state[::-1], coverage[::-1], strict=True)]
-        return Interval(*(inside.clip(0.0, 1.0) * clear * self.over for inside, clear in ends))
-
-
-class _Learned(State):
-    """States of the learned fold."""
-
-    def join(self, columns: Index | slice, operand: State, gates: _Gates) -> tuple[Mask, Mask]:
-        """Take in an operand; whether it changes nothing (n,), and whether nothing else is left (n,)."""
-        d, own_colour = operand
-        low, high = self.distance.low[columns], self.distance.high[columns]
-        up, down, line = gates.up, gates.down, gates.line
-        through = gates.through(Interval(low, high), Interval(own_colour.low[-1], own_colour.high[-1]))
-        past = up * high + down * low
-        least, most = gates.low + (up * low + down * high), gates.high + past
-        paint = Interval(least[1:].max(0).clip(0.0, 1.0), most[1:].max(0).clip(0.0, 1.0))
-        keeps, takes = least[0] < 1, most[0] > 0
-        # where the gate is not wide open, or not shut, its line bounds one number by the other
-        kept = _capped(Interval(low, high), line[1], 1.0 - gates.low[0])
-        taken = _capped(d, -line[0], past[0] + gates.bias)
-        taken = Interval(*(np.where(gates.given, *pair) for pair in zip(d, taken, strict=True)))
-        a, b = taken.low * gates.candidate, taken.high * gates.candidate
-        dent = gates.bump / 4 * (keeps & takes)
-        self.distance.low[columns] = np.minimum(
-            np.where(keeps, kept.low, np.inf), np.where(takes, np.minimum(a, b), np.inf)
-        ) - np.maximum(dent, 0.0)
-        self.distance.high[columns] = np.maximum(
-            np.where(keeps, kept.high, -np.inf), np.where(takes, np.maximum(a, b), -np.inf)
-        ) - np.minimum(dent, 0.0)
-        self.paint(columns, own_colour, paint, through)
-        hides = ~keeps & (paint.low >= 1)
-        return ~takes & (paint.high <= 0), hides if through is None else hides & (through.high <= 0)
-
-
-def _capped(x: Interval, factor: Floats32, most: Floats32) -> Interval:
-    """An interval of those x that have ``factor x <= most``, of which there are some."""
-    bound = most / factor
-    bound = np.minimum(np.maximum(bound, x.low), x.high)
-    return Interval(np.where(factor < 0, bound, x.low), np.where(factor > 0, bound, x.high))
-
-
-LEVELS = 8, 4  # sides of blocks, pixels
 ROUNDING = 1e-6  # world units
 
 
@@ -381,7 +243,7 @@ class Raster(Record):
     high: int
     left: float  # world x of the middle of the first pixel
     top: float  # its world y
-    largest: int = LEVELS[0]  # side of the largest blocks, pixels
+    largest: int  # side of the largest blocks, pixels
 
     def place(self, block: Index, side: int) -> tuple[Index, Index]:
         """Column and row of the first pixels of blocks, numbered from the top row of them down."""
@@ -429,7 +291,7 @@ class Raster(Record):
         return Pairs.of((first[1][objects] + y) * most[0] + first[0][objects] + x, objects)
 
 
-def raster(canvas: tuple[int, int], rows: range, largest: int = LEVELS[0]) -> Raster:
+def raster(canvas: tuple[int, int], rows: range, largest: int) -> Raster:
     """The blocks that hold some rows of a picture."""
     width, height = canvas
     px = 2 / min(width, height)  # world units

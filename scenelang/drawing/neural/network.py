@@ -24,7 +24,6 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-import numpy.typing as npt
 
 from scenelang.compiler.lifting import PLANE_LAYOUT, Layout
 from scenelang.drawing.arrays import NUMPY, Array, Layers
@@ -34,6 +33,7 @@ from scenelang.language.words import TOKENS as WORDS
 
 TOKENS = len(WORDS)
 EMPTY = 1.0  # world units: the margin before the first object, out of reach of every blend
+MOST_KNOWN = 1024  # decoders that are kept
 RADIUS = 2.0  # leaf units: the decoder sees points in this disc, farther ones at its rim
 
 
@@ -146,10 +146,20 @@ class FramedArrays(FramedNetwork):
 
     def __init__(self, config: FramedConfig, arrays: Mapping[str, np.ndarray]) -> None:
         self.config = config
+        self._known: dict[bytes, Any] = {}  # decoders by their codes
         for name, value in arrays.items():
             setattr(self, name, value)
         if not config.units:
             self.decoder_w, self.decoder_b = ([arrays[f"decoder_{k}.{i}"] for i in range(3)] for k in "wb")
+
+    def decoders(self, codes: Array) -> list[Any]:
+        keys = [code.tobytes() for code in codes]
+        if len(self._known) > MOST_KNOWN:
+            self._known.clear()
+        new = [at for at, key in enumerate(keys) if key not in self._known]
+        for at, decoder in zip(new, super().decoders(codes[new]) if new else (), strict=True):
+            self._known[keys[at]] = decoder
+        return [self._known[key] for key in keys]
 
 
 def parameter_shapes(
@@ -178,52 +188,3 @@ def parameter_shapes(
         "bump": (TOKENS, c.state),
         "read_slope": (),
     }
-
-
-Floats = npt.NDArray[np.float64]
-STEEP = 1.05  # that of a true distance is 1
-NODE = 1 / 128  # leaf units, within which nothing is said
-CELLS = 32  # along a side of [-RADIUS, RADIUS]
-RADII = 1 / 16, 1 / 8, 1 / 4  # leaf units
-SIDE = 2 * RADIUS / CELLS
-
-
-class Slopes:
-    """Bounds on how fast the distance f of an element changes: for p in a cell, and q within a radius of p,
-
-        |f(p) - f(q)| <= STEEP sqrt(|p - q|^2 + NODE^2) + s
-
-    with s by place and radius, ``slack`` (radii, CELLS, CELLS) for `RADII`, rows from the least y up, and
-    ``far``, by how much faster f may change where points may lie beyond `RADIUS`.
-    """
-
-    def __init__(self, slack: npt.NDArray[Any], far: float) -> None:
-        self.far, levels, radius = far, [*np.asarray(slack, np.float64)], RADII[-1]
-        while radius < 2 * RADIUS:  # half of the way from p, and the other half from its middle
-            levels.append(levels[-1] + around(levels[-1], int(np.ceil(radius / SIDE))))
-            radius *= 2
-        self._levels = np.stack([*levels, np.full_like(levels[0], np.inf)])
-        self._radii = RADII[0] * 2.0 ** np.arange(len(levels))
-
-    def rise(self, q: Floats, radius: Floats) -> Floats:
-        """Greatest difference (M,) of f at leaf coordinates (2, M) from f within radii (M,)."""
-        squared = radius * radius
-        length = np.sqrt(q[0] * q[0] + q[1] * q[1])
-        level = self._radii.searchsorted(radius) if radius.max() > RADII[0] else 0
-        seen = q * (RADIUS / SIDE / np.maximum(length, RADIUS)) + CELLS / 2
-        # beyond all numbers nothing is known
-        wild = ~(length < np.inf)
-        x, y = np.where(wild, 0.0, seen).astype(np.intp).clip(0, CELLS - 1)
-        slack = self._levels[level, y, x]
-        root = np.sqrt(squared + NODE**2)
-        rise: Floats = STEEP * root + slack + np.where(length + radius > RADIUS, self.far * root, 0.0)
-        return np.where(wild | (rise != rise), np.inf, rise)
-
-
-def around(values: Floats, rings: int) -> Floats:
-    """The largest of each cell and those in so many rings about it."""
-    for _ in range(rings):
-        edge = np.pad(values, 1)
-        rows = np.maximum(np.maximum(edge[:-2], edge[1:-1]), edge[2:])
-        values = np.maximum(np.maximum(rows[:, :-2], rows[:, 1:-1]), rows[:, 2:])
-    return values

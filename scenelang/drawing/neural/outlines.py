@@ -19,7 +19,6 @@ import numpy.typing as npt
 from scenelang.assets.element import GRAIN, Element
 from scenelang.assets.pyramid import curves_of
 from scenelang.drawing.arrays import Array, Arrays
-from scenelang.drawing.neural.network import CELLS, RADII, Slopes
 
 Floats = npt.NDArray[np.float64]
 FLAT: Final = 0.001  # leaf units: farthest from its chord that a piece may bend
@@ -120,12 +119,6 @@ def _joined(elements: tuple[Element, ...]) -> tuple[npt.NDArray[np.generic], ...
     way = pieces[2:4] + pieces[4:6]
     chords = np.concatenate([pieces[:2], way, 1 / np.maximum((way * way).sum(0), 1e-12)[None]])
     return pieces, np.append(np.concatenate(first), len(near)), near, chords
-
-
-@lru_cache
-def true_slopes() -> Slopes:
-    """What bounds true distances, which change by no more than a point moves."""
-    return Slopes(np.zeros((len(RADII), CELLS, CELLS)), 1e-9)  # 0 times infinity would be no number
 
 
 class OutlineShapes:

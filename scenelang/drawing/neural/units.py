@@ -1,4 +1,4 @@
-"""Norm units of the plane: decoders that are exact, and how far their answers may differ within a radius.
+"""Norm units of the plane: decoders that are exact.
 
 They are those of solids (`solid/norms.py`) with one unit more, which is taken away where a leaf is notched:
 
@@ -16,9 +16,8 @@ from functools import lru_cache, reduce
 from itertools import accumulate, pairwise
 
 import numpy as np
-import numpy.typing as npt
 
-from scenelang.drawing.arrays import NUMPY, Array, Arrays
+from scenelang.drawing.arrays import Array, Arrays
 from scenelang.drawing.solid.norms import Norms
 
 SECTORS = 3, 5, 6  # orders of symmetry
@@ -26,10 +25,6 @@ RADIAL, UP, FIRST = 0, 3, 4  # places of features; behind them those of sectors,
 FEATURES = FIRST + 2 * len(SECTORS) + 1
 GROUPS = (0,), (1, 2), (3,), *((FIRST + 2 * i, FIRST + 2 * i + 1) for i in range(len(SECTORS)))
 """Features that together change by no more than a point moves."""
-
-FARTHEST = 1e9  # leaf units
-
-Floats = npt.NDArray[np.float64]
 
 
 @lru_cache
@@ -75,54 +70,30 @@ class LeafUnits:
 
     def __init__(self, xp: Arrays, layers: Norms) -> None:
         self.xp, self.layers = xp, layers
-        w, self._b, self._radius = (np.asarray(xp.to_numpy(part), np.float64) for part in layers[:3])
+        w = np.asarray(xp.to_numpy(layers.w), np.float64)
         every = np.zeros((len(w), FEATURES))
-        every[:, layers.features] = self._w = w
+        every[:, layers.features] = w
         ends = [*accumulate((layers.notch, *layers.units, layers.inner), initial=0)]
         self.parts = [slice(*pair) for pair in pairwise(ends)]
         """Lines of the notch, of each unit, and inside."""
         parts = [every[:, group] for group in GROUPS]
-        self._steep = sum(np.linalg.norm(part, axis=1) for part in parts)  # of each line
-        self._whole = [float(sum(np.linalg.norm(part[at], 2) for part in parts)) for at in self.parts]
+        # how fast each line changes at most, and the notch and each unit, per leaf unit
+        self.steep = sum(np.linalg.norm(part, axis=1) for part in parts)
+        self.whole = [float(sum(np.linalg.norm(part[at], 2) for part in parts)) for at in self.parts[:-1]]
 
-    def _levels(self, xp: Arrays, q: Array, w: Array, b: Array) -> Array:
-        return xp.dense(features(xp, q, self.layers.features), w, b)
+    @property
+    def steepest(self) -> float:
+        """How fast the distance changes at most."""
+        inside = float(self.steep[self.parts[-1]].max(initial=0.0))
+        return self.whole[0] + max(self.whole[1:], default=0.0) + inside
 
     def distance(self, q: Array) -> Array:
         """Distances (M,) at leaf coordinates (2, M), leaf units."""
         xp, (notch, *units, inner) = self.xp, self.parts
-        levels = self._levels(xp, q, self.layers.w, self.layers.b)
+        levels = xp.dense(features(xp, q, self.layers.features), self.layers.w, self.layers.b)
         above = xp.above(levels[: inner.start])
         lengths = [xp.length([*above[part]]) for part in units] or [0 * q[0]]
         d = reduce(xp.maximum, lengths) - self.layers.radius
         if inner.start < inner.stop:
             d = d + xp.largest(levels[inner])[0].clip(None, 0.0)
         return d - xp.length([*above[notch]]) if notch.stop else d
-
-    def rise(self, q: Floats, radius: Floats) -> Floats:
-        """Greatest difference (M,) of distances at leaf coordinates (2, M) from those within radii (M,)."""
-        *outer, inner = self.parts
-        radius = np.minimum(radius, FARTHEST)  # of an infinite one no share is a number
-        levels = self._levels(NUMPY, q, self._w, self._b)
-        more = self._steep[:, None] * radius
-        low, middle, high = [], [], []
-        for part, whole in zip(outer, self._whole, strict=False):
-            ends = (levels[part] + change * more[part] for change in (-1, 0, 1))
-            least, own, most = (NUMPY.length([*np.maximum(end, 0.0)]) for end in ends)
-            middle.append(own)
-            low.append(np.maximum(least, own - whole * radius))
-            high.append(np.minimum(most, own + whole * radius))
-        depth = [np.zeros_like(radius)] * 3
-        if inner.start < inner.stop:
-            ends = (levels[inner] + change * more[inner] for change in (-1, 0, 1))
-            depth = [np.minimum(end.max(0), 0.0) for end in ends]
-        d, least, most = (
-            reduce(np.maximum, own[1:] or [0 * radius]) + deep - taken
-            for own, deep, taken in (
-                (middle, depth[1], middle[0]),
-                (low, depth[0], high[0]),
-                (high, depth[2], low[0]),
-            )
-        )
-        result: Floats = np.maximum(most - d, d - least)
-        return np.where(result >= 0.0, result, np.inf)  # of what is no number nothing is known
