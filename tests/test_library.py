@@ -17,7 +17,6 @@ import scenelang as nsg
 from scenelang.drawing import torch_backend
 from scenelang.drawing.how import Device
 from scenelang.drawing.neural import files
-from scenelang.drawing.neural.draw import draw
 from scenelang.web import notebook
 
 SMALL = (24, 16)
@@ -255,14 +254,6 @@ def test_pictures_repeat(device: Device) -> None:
         image = nsg.render(compiled, device=device, threads=threads)
         assert np.abs(image - first).max() <= STEP
         assert np.array_equal(nsg.render(compiled, device=device, threads=threads), image)
-
-
-def test_tiles_do_not_show() -> None:
-    compiled, network = program(FOUR), torch_backend.open_model("shapes2d").network
-    arguments = (network, compiled)
-    whole = draw(*arguments, tile=1 << 20).image
-    for tile in (1, 700, 1 << 12):
-        assert np.abs(draw(*arguments, tile=tile).image - whole).max() <= STEP
 
 
 def test_torch_keeps_its_number_of_threads() -> None:

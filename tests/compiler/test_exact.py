@@ -109,25 +109,6 @@ def test_discs_are_carried_into_discs(inner: int, outer: int, size: float) -> No
     assert (np.hypot(*(np.array(carry_back(steps_of(levels), near)) - q)) <= radius * (1 + 1e-9)).all()
 
 
-@pytest.mark.parametrize("strength", [1.0, 1e-3])
-@pytest.mark.parametrize(("inner", "outer"), [(0, 0), (1, 0), (2, 3), (0, 2)])
-def test_points_near_the_leaf_move_no_faster_than_the_frame_says(
-    inner: int, outer: int, strength: float
-) -> None:
-    rng = np.random.default_rng(inner + outer)
-    levels = random_levels(rng, inner, outer, strength)
-    frames = Frames(lift_many([levels], [CODE]))
-    x, y = rng.uniform(-4, 4, (2, 20000))
-    step = 1e-5
-    qx, qy = carry_back(steps_of(levels), (x, y))
-    for dx, dy in ((step, 0.0), (0.0, step)):
-        rx, ry = carry_back(steps_of(levels), (x + dx, y + dy))
-        speed = np.hypot(rx - qx, ry - qy) / step
-        near = np.hypot(qx, qy) <= 1
-        assert near.any()
-        assert speed[near].max() <= frames.growth * (1 + 1e-3)
-
-
 @pytest.mark.parametrize(("inner", "outer"), SIZES)
 @pytest.mark.parametrize("radius", [1.0, 3.0])
 def test_boxes_hold_discs(inner: int, outer: int, radius: float) -> None:

@@ -10,6 +10,7 @@ import pytest
 import scenelang as nsg
 from scenelang.compiler.spaces import Sky, Stage
 from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.neural import draw
 from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
@@ -39,6 +40,7 @@ def around_of(text: str) -> Around:
     kept: list[Around] = []
     before = Around.look
     with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(draw, "sized", lambda program: program)  # points are those of the scene
         patch.setattr(Around, "look", lambda around, *more: (kept.append(around), before(around, *more)))
         nsg.render(nsg.compile(nsg.loads(text)))
     return kept[0]

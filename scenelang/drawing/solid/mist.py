@@ -89,7 +89,7 @@ class Mist:
         self.low = low - 0.999 * h
         if ground is not None and high[1] > ground.y:
             self.low[1] = max(self.low[1], ground.y + 1e-3)
-        self.sides = tuple(int(n) for n in np.ceil((high - self.low) / h) + 2)
+        self.sides = tuple(int(n) for n in np.ceil((high - self.low).clip(0.0) / h) + 2)
         self.strides = self.sides[1] * self.sides[2], self.sides[2], 1
         axes = [a + h * np.arange(n) for a, n in zip(self.low, self.sides, strict=True)]
         # (n, 4) by nodes what their light is on the way to surfaces, and their density
