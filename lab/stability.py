@@ -242,17 +242,13 @@ def _change(model: Model, frames: Sequence[Scene], per_side: int = 2) -> float:
 
 
 def arithmetic(model: Model, scenes: int, seed: int) -> dict[str, float]:
-    """Largest changes of a picture by tiles, threads and skipping, on base scenes."""
+    """Largest changes of a picture by threads and skipping, on base scenes."""
     probe = kit_of(model.manifest).probes["objects"]
     ways: dict[str, dict[str, Any]] = {"threads": {"threads": 2}}
     if isinstance(model.network, Framed):
-        ways = {
-            "tiles": {"tile": 1999},
-            "threads": {"threads": 2, "tile": 1 << 13},
-            "skipping": {"skip": False},
-        }
+        ways |= {"skipping": {"skip": False}}
     elif not isinstance(model.network, Solids):
-        return dict.fromkeys(("tiles", "threads", "skipping"), 0.0)  # draws whole pictures
+        return dict.fromkeys(("threads", "skipping"), 0.0)  # draws whole pictures
     most = dict.fromkeys(ways, 0.0)
     for index in range(scenes):
         scene = scene_of(probe, 4, index, seed, model)

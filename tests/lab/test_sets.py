@@ -102,8 +102,7 @@ def test_a_plan_of_an_example() -> None:
     assert plan["rows"] == plan["stages"][-1]["objects"] == 2
     ways = plan["ways"]
     assert set(ways) == set(WAYS)
-    pixels = plan["drawing"]["pixels"]
-    assert ways["both"]["meetings"] == 4 * pixels * plan["rows"]
+    assert ways["both"]["meetings"] == 4 * 256**2 * plan["rows"]
     assert ways["as shipped"]["meetings"] == plan["drawing"]["meetings"]
     assert ways["as shipped"]["meetings"] < ways["every sample meets every object"]["meetings"]
     assert ways["four samples in every pixel"]["meetings"] < ways["both"]["meetings"]
