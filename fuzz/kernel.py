@@ -91,9 +91,9 @@ def ask(kernel: Kernel, program: Program, seed: int) -> None:
     lamp, radius = rng.normal(size=3) * 10.0 ** rng.integers(-1, 2), float(rng.choice([0.0, 0.1, 3.0, 1e9]))
     kernel.cones(tables, lamp.astype(np.float32), radius, p, way)
     if program.stage is not None:
-        width, height = rng.choice([1, 7, 20], 2).tolist()
+        width, height = rng.choice([1, 3, 7], 2).tolist()
         pace, glow = MARCH_SETTINGS["adaptive"]._replace(gap=gap), tables.looks.hues * tables.looks.glowing
-        shown, (count, every) = [tables] * 2, (int(rng.choice([0, 4, 9, 400])), bool(rng.random() < 0.3))
+        shown, (count, every) = [tables] * 2, (int(rng.choice([0, 4, 9, 289])), bool(rng.random() < 0.3))
         stage, (lamps, _) = stage_rows(
             program.stage, (width, height), pace, count, every and count > 0, glow, shown
         )
