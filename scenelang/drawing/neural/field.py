@@ -246,7 +246,8 @@ class Field:
         path: list[int] = []
 
         def join(row: int, operand: tuple[Array, Array, Array], at: int) -> None:
-            fresh = not met[at] and self.operators[row] <= SMOOTH
+            # the first operand of a group begins its state
+            fresh = at > 0 and not met[at] and self.operators[row] <= SMOOTH
             stack[at], met[at] = self._joined(stack[at], row, operand, fresh, owners), True
 
         def end(kept: int) -> None:
