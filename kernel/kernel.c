@@ -159,8 +159,10 @@ void NAME(finish)(const Scene *s, const Stage *stage, int32_t top, int32_t botto
     finished(&j, top, bottom, first, last, picture, pixel, out);
     counted(&j, counts);
 }
+// Scratch of rays that gather, which see media of all colours alike.
 static Gather gathering(const Scene *s, const Around *a, void *scratch) {
-    Gather w = {s, a, aligned(scratch), 0, 0, 0, 0};
+    Gather w = {*s, a, aligned(scratch), 0, 0, 0, 0};
+    w.scene.coloured = 0;
     w.list = (int32_t *)(w.slot + s->objects + 1);
     w.level = aligned(w.list + s->objects + 1);
     for (int i = 0; i < s->objects; i++) w.list[i] = i;
@@ -172,18 +174,14 @@ static Gather gathering(const Scene *s, const Around *a, void *scratch) {
 void NAME(around)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, const float *turn, int32_t rays,
                   int32_t finer, float *light, int64_t *begin, int32_t *index, float *share, float *row, int64_t counts[2],
                   void *scratch) {
-    Scene own = *s;
-    own.coloured = 0;
-    Gather w = gathering(&own, a, scratch);
+    Gather w = gathering(s, a, scratch);
     gathered(&w, w.level, n, n, p, normal, turn, rays, finer, light, begin ? &(Exchange){begin, index, share, row} : 0);
     counts[0] = w.rays; counts[1] = w.met;
 }
 // Light (3, n) that comes to n points (3, n) from unit directions, without media, and from how far (n).
 void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, const float *way, int32_t finer, float *light,
                     float *reach, void *scratch) {
-    Scene own = *s;
-    own.coloured = 0;
-    Gather w = gathering(&own, a, scratch);
+    Gather w = gathering(s, a, scratch);
     for (int64_t from = 0; from < n; from += BEAM) {
         int some = (int)(n - from < BEAM ? n - from : BEAM);
         for (int d = 0; d < 3; d++) for (int i = 0; i < some; i++) {
@@ -198,9 +196,7 @@ void NAME(arriving)(const Scene *s, const Around *a, int64_t n, const float *p, 
 // Light of what glows at n points, as of `glowing`; the number of rays that there was room for.
 int64_t NAME(glowing)(const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth, float *light,
                       float *free, int32_t *point, float *ray, int64_t room, void *scratch) {
-    Scene own = *s;
-    own.coloured = 0;
-    Gather w = gathering(&own, a, scratch);
+    Gather w = gathering(s, a, scratch);
     int64_t count = 0;
     glowing(&w, n, p, normal, worth, light, free, point, ray, room, &count);
     return count;

@@ -37,11 +37,11 @@ typedef struct {
 } Level;
 // Parts of nodes that others see: those of the jth lie from begin[j] on; `row` has a 0 for each node.
 typedef struct { int64_t *begin; int32_t *index; float *share, *row; } Exchange;
-typedef struct { const Scene *scene; const Around *around; Slot *slot; int32_t *list; Level *level; int64_t met, rays; } Gather;
+typedef struct { Scene scene; const Around *around; Slot *slot; int32_t *list; Level *level; int64_t met, rays; } Gather;
 
 // How far rays (n) get, and how deep the media before that are; unless null, the field's gradients there.
 static ONCE void trace(Gather *w, Rays *r, int n, Rows *slope) {
-    const Scene *s = w->scene;
+    const Scene *s = &w->scene;
     w->rays += n;
     for (int i = n; i % W; i++) {
         for (int d = 0; d < 3; d++) { r->from.v[d][i] = r->from.v[d][n - 1]; r->way.v[d][i] = r->way.v[d][n - 1]; }

@@ -159,10 +159,8 @@ class Kernel:
         """Distances (M,) of objects alone by their numbers (M,), from 0, whatever else is at points (3, M),
         and the gradients (3, M) of these, or none.
         """
-        numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
+        numbers, points = _alone(tables, objects, points)
         count = len(numbers)
-        assert points.shape == (3, count)
-        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
         distance, slope = np.empty(count, np.float32), np.empty((3, count * gradient), np.float32)
         places = [part.ctypes.data if part.size else None for part in (numbers, points, distance, slope)]
         self._library.own(self.variant, tables.scene.ctypes.data, count, *places, None)
@@ -170,13 +168,10 @@ class Kernel:
 
     def worn(self, tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]) -> Floats:
         """Colours (3, M) of objects alone by their numbers (M,), from 0, at points (3, M), with textures."""
-        numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
-        count = len(numbers)
-        assert points.shape == (3, count)
-        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
-        result = np.empty((3, count), np.float32)
+        numbers, points = _alone(tables, objects, points)
+        result = np.empty_like(points)
         given = numbers.ctypes.data, points.ctypes.data, None, None, result.ctypes.data
-        self._library.own(self.variant, tables.scene.ctypes.data, count, *given)
+        self._library.own(self.variant, tables.scene.ctypes.data, len(numbers), *given)
         return result
 
     def crossings(
@@ -191,10 +186,9 @@ class Kernel:
         objects alone, by their numbers (M,), from 0, and how far along (k,), from 0 to 1. Steps are as long
         as the distance, which changes at rates (M,) at most, and at least so small a part (M,) of a line.
         """
-        numbers = np.ascontiguousarray(objects, np.int32)
+        numbers, begin = _alone(tables, objects, begin)
         given = [np.ascontiguousarray(part, np.float32) for part in (begin, way, *parts)]
         count, room = len(numbers), 4 * len(numbers)
-        assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
         while True:
             line, along = np.empty(room, np.int32), np.empty(room, np.float32)
             places = [part.ctypes.data for part in (numbers, *given)]
@@ -393,7 +387,7 @@ class Kernel:
         return result, asked, met
 
     def exchanged(self, parts: Exchange, sent: Floats) -> Floats:
-        """What nodes receive (3, M) where they send (3, M)."""
+        """Light that nodes receive (3, M) where they send (3, M)."""
         sent = np.ascontiguousarray(sent.T, np.float32)
         result = np.empty_like(sent)
         places = [part.ctypes.data for part in (*parts, sent, result)]
@@ -488,6 +482,16 @@ class Kernel:
             numbers.append(point[:found] + np.int32(some.start))
             rays.append(ray[:, :found])
         return light, free, np.concatenate(numbers), np.concatenate(rays, 1)
+
+
+def _alone(
+    tables: Tables, objects: npt.NDArray[np.integer], points: npt.NDArray[Any]
+) -> tuple[npt.NDArray[np.int32], Floats]:
+    """Numbers (M,) of objects, from 0, and a point (3, M) for each, as the library takes them."""
+    numbers, points = np.ascontiguousarray(objects, np.int32), np.ascontiguousarray(points, np.float32)
+    assert points.shape == (3, len(numbers))
+    assert ((numbers >= 0) & (numbers < tables.scene["objects"])).all()
+    return numbers, points
 
 
 def _portion(tables: Tables) -> int:

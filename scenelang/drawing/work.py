@@ -15,6 +15,7 @@ import numpy as np
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import LESS, RenderError, Samples
 from scenelang.drawing.neural.files import load_arrays
+from scenelang.drawing.size import sized
 from scenelang.drawing.solid.around import light_work
 from scenelang.drawing.solid.draw import draw_solids
 from scenelang.drawing.solid.field import SolidField
@@ -80,6 +81,7 @@ def _overlaid(corners: np.ndarray, outlines: np.ndarray, half: np.ndarray) -> fl
 
 
 def _of_solids(program: Program, network: Any) -> Load:
+    program = sized(program)  # as it is drawn
     (width, height), stage, pixels = program.canvas, program.stage, program.canvas[0] * program.canvas[1]
     assert stage is not None
     some = slice(None, None, -(-len(program) // MANY) or 1)
@@ -172,7 +174,7 @@ def plan_of(program: Program, network: Any, samples: Samples = "adaptive") -> Pl
 
 
 def late_plan(program: Program) -> Plan:
-    """How a Program is drawn where it took longer than was foretold."""
+    """A coarser way for a Program that took longer than was foretold."""
     sky = program.stage is not None and program.stage.sky is not None
     return _coarser(program, LATE, sky, "more work than was foretold: ")
 

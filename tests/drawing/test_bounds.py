@@ -1,4 +1,4 @@
-"""What the kernel leaves out in the plane: pictures against those of every object at every sample."""
+"""Skipping by the kernel in the plane: pictures against those of every object at every sample."""
 
 from __future__ import annotations
 

@@ -71,7 +71,7 @@ class GridShape(Lattice):
         return self.xp.select(beyond > 0, self.xp.sqrt(result * result + beyond), result)
 
     def steepest(self) -> float:
-        """How fast the distance in the plane changes at most; infinite for grids that end inside."""
+        """The rate at which the distance in the plane changes at most; infinite for grids that end inside."""
         grid = self.xp.to_numpy(self.nodes).astype(np.float64).reshape(self.side, self.side)
         if min(grid[[0, -1]].min(), grid[:, [0, -1]].min()) < 0:
             return np.inf

@@ -241,12 +241,11 @@ def program_outputs(
 
 
 def _outputs(network: FramedNetwork | SolidNetwork, program: Program, threads: int) -> Outputs:
-    if (stage := program.stage) is not None:
-        by, program = stage.growth, sized(program)
+    if program.stage is not None:
+        by, program = program.stage.growth, sized(program)
+        assert program.stage is not None
         solids = solid_field(network, program.vectors, program.tokens, program.brought())  # type: ignore[arg-type]
-        result = solid_outputs(
-            solids, stage.scaled(by), program.canvas, threads=threads, count=program.samples
-        )
+        result = solid_outputs(solids, program.stage, program.canvas, threads=threads, count=program.samples)
         assert result.depth is not None
         result = replace(result, depth=result.depth / np.float32(by))
     else:

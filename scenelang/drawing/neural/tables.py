@@ -59,7 +59,7 @@ UNKNOWN: Final = 1e9  # a slope of which nothing is known
 
 
 class FlatTables(Held):
-    """What the kernel takes of a field of the plane; keeps the arrays that the `FLAT` row points to.
+    """The kernel's view of a field of the plane; keeps the arrays that the `FLAT` row points to.
 
     Raises `ProgramError` where a number is none, or an element or a decoder is more than the kernel knows.
     """

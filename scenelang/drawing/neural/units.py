@@ -83,7 +83,7 @@ class LeafUnits:
 
     @property
     def steepest(self) -> float:
-        """How fast the distance changes at most."""
+        """The rate at which the distance changes at most."""
         inside = float(self.steep[self.parts[-1]].max(initial=0.0))
         return self.whole[0] + max(self.whole[1:], default=0.0) + inside
 

@@ -374,7 +374,7 @@ class Around:
         return load_kernel().glowing(tables, self.row, p, n, worth, parts=parts, until_s=until)[:2]
 
     def drawn(self, p: Array) -> tuple[np.ndarray, Array, Array]:
-        """Of rays from points (3, K) to some of what glows, drawn by what surfaces that face it receive,
+        """Rays from points (3, K) to some of what glows, drawn by what surfaces that face it receive:
         numbers (k,) of the points, unit ways (3, k), and light (3, k), in sum what arrives.
         """
         tables, until = self.field.tables, self.field.network.until_s

@@ -620,7 +620,7 @@ def paced(field: SolidField, pace: MarchSettings) -> MarchSettings:
 
 
 def shadowing(field: SolidField, stage: Stage) -> tuple[SolidField, SolidField]:
-    """What is opaque alone, and what is not, as lamps of a radius see it; the field itself without such."""
+    """The field of what is opaque alone, and that of the rest, for lamps of a radius; itself without such."""
     reach = max([light.radius for light in stage.lights], default=0.0)
     return (field.opaque((ASIDE + WIDE) * reach), field.hazy()) if reach else (field, field)
 

@@ -55,7 +55,8 @@ function lightsFrom(lamps, known) {
 
 function partFrom(word, [...values], { usual, fields }) {
   if (word === "ground" && values[0] === null) {
-    return values.slice(1).every((value) => value === undefined) ? null : refuse("`ground(none)` has other values");
+    const more = ["colour", "fade"].filter((_, at) => values[at + 1] !== undefined);
+    return more.length ? refuse(`\`ground(none)\` has no ${more[0]}`) : null;
   }
   const part = { ...usual[word] };
   fields[word].forEach(([name, kind, low, high], at) => {
