@@ -272,7 +272,7 @@ MISTAKES = [
     ("chain { if (n < 2) { square; } subtract star; }", 2, "nothing before it"),
     ('square { rotate(n > 1 ? "no" : 0); }', 2, "expected an angle, found a string"),
     ("star { material flat { opacity(n); } }", 2, "opacity of 2 is outside"),
-    ("sphere { material volumetric { density(50 * n); } }", 3, "density of 150"),
+    ("sphere { material volumetric { density(5e5 * n); } }", 3, "density of 1500000"),
     ("sphere { material diffuse { glow(#f00, 1 - n); } }", 2, "power of -1"),
     ("light(n > 1 ? none : [1, 2, 3]); light(); sphere;", 2, "beside another light"),
     ("star { material flat { opacity(0.5); if (n > 1) { opacity(0.6); } } }", 2, "given twice"),
