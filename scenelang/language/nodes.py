@@ -637,8 +637,16 @@ def blend_width(op: str, k: float) -> float | None:
     return nextafter(BLEND, 1.0) if op in ("subtract", "intersect") else None
 
 
+def _unions_without_width(schema: dict[str, Any]) -> None:
+    _kind_needed(schema)
+    schema["if"] = {"properties": {"op": {"const": "union"}}}
+    schema["then"] = {"properties": {"k": {"enum": [None, BLEND]}}}
+
+
 class _Joining(Frozen):
     """Base of nodes that join by an operator."""
+
+    model_config = ConfigDict(json_schema_extra=_unions_without_width)
 
     @model_validator(mode="after")
     def _unions_have_no_width(self, info: ValidationInfo) -> Self:
