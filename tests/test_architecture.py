@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import functools
 import re
 import subprocess
 import sys
@@ -61,12 +62,15 @@ def imports(path: Path) -> Iterator[tuple[str, int]]:
                 yield (full if full in MODULES else str(node.module)), node.lineno
 
 
-IMPORTS = [
-    (module, target, f"{path.relative_to(ROOT)}:{line} imports {target}")
-    for module, path in MODULES.items()
-    if module not in FACADES
-    for target, line in imports(path)
-]
+@functools.cache
+def all_imports() -> list[tuple[str, str, str]]:
+    """Every module, what it imports, and where."""
+    return [
+        (module, target, f"{path.relative_to(ROOT)}:{line} imports {target}")
+        for module, path in MODULES.items()
+        if module not in FACADES
+        for target, line in imports(path)
+    ]
 
 
 def inside(module: str, prefix: str) -> bool:
@@ -80,14 +84,14 @@ def place(module: str) -> int:
 
 
 def test_imports_run_forward() -> None:
-    wrong = [said for module, target, said in IMPORTS if target in MODULES and place(target) > place(module)]
+    wrong = [said for module, target, said in all_imports() if target in MODULES and place(target) > place(module)]
     assert not wrong, "\n".join(wrong)
 
 
 def test_no_imports_run_in_a_circle() -> None:
     """Imports for types alone and in functions count: they are read in an order too."""
     graph: dict[str, set[str]] = {}
-    for module, target, _ in IMPORTS:
+    for module, target, _ in all_imports():
         if target in MODULES and target != module:
             graph.setdefault(module, set()).add(target)
     TopologicalSorter(graph).prepare()  # raises CycleError, which names one
@@ -97,11 +101,11 @@ def test_what_some_may_not_import() -> None:
     """Reference and renderers stay apart, the compiler needs no torch, nothing a facade or the laboratory."""
     wrong = [
         said
-        for module, target, said in IMPORTS
+        for module, target, said in all_imports()
         for source, forbidden in FORBIDDEN
         if inside(module, source) and inside(target, forbidden)
     ]
-    wrong += [said for _, target, said in IMPORTS if target == "scenelang"]
+    wrong += [said for _, target, said in all_imports() if target == "scenelang"]
     assert not wrong, "\n".join(wrong)
 
 

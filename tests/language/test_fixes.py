@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import random
 import re
 from collections.abc import Mapping
@@ -214,19 +215,23 @@ def check(text: str) -> list[Diagnostic]:
     return list(found)
 
 
-# Their one mistake hides others on purpose.
-HIDING = {"reported once in a loop", "poison is silent"}
-FIXABLE = [
-    (title, text)
-    for title, text in SINGLE
-    if title not in HIDING and sum(d.fix is not None for d in check(text)) == 1
-]
+# Their one mistake hides others on purpose, or takes seconds to be reached and has no fix.
+LEFT_OUT = {
+    *("reported once in a loop", "poison is silent"),
+    *("a loop in a vector that runs too long", "a long vector"),
+}
+
+
+@functools.cache
+def fixable() -> list[tuple[str, str, list[Diagnostic]]]:
+    """Scenes of one mistake that has a fix, and what is said of them."""
+    said = [(title, text, check(text)) for title, text in SINGLE if title not in LEFT_OUT]
+    return [one for one in said if sum(d.fix is not None for d in one[2]) == 1]
 
 
 def test_a_fix_mends() -> None:
     wrong = []
-    for title, text in FIXABLE:
-        before = check(text)
+    for title, text, before in fixable():
         after, applied = apply_fixes(text, before)
         left = [d.code for d in check(after) if d.code != "W0201"]
         if len(applied) != 1 or left != [d.code for d in before if d is not applied[0]]:
@@ -236,7 +241,7 @@ def test_a_fix_mends() -> None:
 
 def test_most_kinds_of_mistakes_that_can_be_mended_are() -> None:
     """A list to keep in step: codes whose page has an example that is mended by itself."""
-    mended = {title.removeprefix("page of ") for title, _ in FIXABLE if title.startswith("page of ")}
+    mended = {title.removeprefix("page of ") for title, *_ in fixable() if title.startswith("page of ")}
     assert mended == {
         *("E0102", "E0107", "E0111", "E0114", "E0116", "E0117", "E0119"),
         *("E0123", "E0126", "E0127", "E0130", "E0132", "E0133", "W0101"),
