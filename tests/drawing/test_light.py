@@ -244,15 +244,15 @@ def test_same_again() -> None:
     stage = Stage(lights=(Light((2.5, 4.0, 3.0), 20.0, (1.0, 1.0, 1.0), 0.5),), sky=Sky(0.5))
 
     def drawn(stage: Stage, paths: int) -> Image:
-        return solid.solid_image(root, stage, (12, 8), light=partial(picture.sky_light, paths=paths))
+        return solid.solid_image(root, stage, (9, 6), light=partial(picture.sky_light, paths=paths))
 
     one, other = (drawn(stage, 4) for _ in range(2))
     assert (one == other).all()
-    fine = drawn(stage, 64)
+    fine = drawn(stage, 32)
     left = float(np.sqrt(np.mean((np.asarray(one, float) - fine) ** 2)))
     assert 0.5 * left < one.noise < 2.0 * left
     clear = drawn(replace(stage, transparent=True, ground=None), 2)
-    plain = solid.solid_image(root, replace(stage, transparent=True, ground=None, sky=None), (12, 8))
+    plain = solid.solid_image(root, replace(stage, transparent=True, ground=None, sky=None), (9, 6))
     assert clear[..., 3] == pytest.approx(plain[..., 3], abs=1e-6)
     with pytest.raises(ValueError, match="inside an opaque object"):
         drawn(replace(stage, camera=Camera((0.0, 0.0, 0.1))), 2)

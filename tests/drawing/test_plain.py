@@ -192,8 +192,10 @@ def rays(program: nsg.Program) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return eyes, ways, np.full(ways.shape[1], 12.0, np.float32)
 
 
-@LIBRARIES
-@pytest.mark.parametrize("name", ["bracket", "castle", "fog", "lantern", "teatime", "turned"])
+@pytest.mark.parametrize(
+    ("name", "library"),
+    [*zip(["bracket", "castle", "fog", "lantern", "teatime", "turned"], [*NETS] * 3, strict=True)],
+)
 def test_rays_are_the_kernels(name: str, library: str) -> None:
     plain, given = of(shipped(name), library), rays(shipped(name))
     expected = KERNEL.rays(tables_of(plain), *given, gap=GAP)
@@ -226,8 +228,7 @@ MIST = "material volumetric {{ color({}); density({}); }}"
 MEDIA = (("#d33", 2), ("#36c", 2)), (("#d33", 2), ("#d33", 7)), (("#d33", 1), ("#36c", 5))
 
 
-@LIBRARIES
-@pytest.mark.parametrize("media", MEDIA)
+@pytest.mark.parametrize(("media", "library"), [*zip(MEDIA, ["torch", "numpy", "torch"], strict=True)])
 def test_pieces_of_media(media: Any, library: str) -> None:
     """Sums of the kernel's extinction at many points of rays; pieces are of one density and colour each."""
     one, two = (MIST.format(*medium) for medium in media)

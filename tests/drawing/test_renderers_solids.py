@@ -389,12 +389,12 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_pictures_are_those_of_the_reference_of_solid_textures(name: str) -> None:
     objects, least = SCENES[name]
-    exact = solid_image(graph(objects), Stage(), (48, 48))
-    found, _ = draw_solids(field(objects), Stage(), (48, 48))
+    exact = solid_image(graph(objects), Stage(), (32, 32))
+    found, _ = draw_solids(field(objects), Stage(), (32, 32))
     assert psnr_db(found, exact) > least
-    plain, _ = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (48, 48))
+    plain, _ = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (32, 32))
     assert psnr_db(plain, exact) < psnr_db(found, exact) - 6
-    other, _ = draw_solids(field(objects, torch_network()), Stage(), (48, 48))
+    other, _ = draw_solids(field(objects, torch_network()), Stage(), (32, 32))
     assert abs(np.asarray(other) - found).max() < 2 / 255
 
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Callable
 
 import numpy as np
 import pytest
@@ -21,18 +22,37 @@ subtract(k = 0.1 * k) {
 cylinder { scale(0.2 * k, 0.4 * k, 0.2 * k); translate(1.2 * k, 0, 0); twist(0.4 / k); }
 torus { scale(0.4 * k); translate(0, 0.9 * k, 0); material volumetric { density(5 / k); } }
 """
+SOFT = """
+camera(eye = k * [0, 1, 4]); ground(-0.7 * k, fade = 8 * k);
+light(k * [-2, 2, 1], 16 * k * k, radius = 0.3 * k); sphere { scale(0.6 * k); }
+"""
 
 
 def scene(k: float, more: str = "") -> nsg.Scene:
     return nsg.loads(f"nsg 1; let k = {k!r}; {more} {SCENE}")
 
 
-@pytest.mark.parametrize("backend", ["neural", "exact", "reference"])
-def test_pictures_do_not_depend_on_the_unit(backend: str) -> None:
-    usual = np.asarray(nsg.render(scene(1.0), backend=backend))
+def hold(draw: Callable[[float], nsg.Image], scales: tuple[float, ...]) -> None:
+    usual = np.asarray(draw(1.0))
     assert usual.std() > 0.1
-    for k in (1e-4, 0.03, 1e4):
-        assert abs(np.asarray(nsg.render(scene(k), backend=backend)) - usual).max() < 2 / 255
+    for k in scales:
+        assert abs(np.asarray(draw(k)) - usual).max() < 2 / 255
+
+
+@pytest.mark.parametrize("backend", ["neural", "exact"])
+def test_pictures_do_not_depend_on_the_unit(backend: str) -> None:
+    hold(lambda k: nsg.render(scene(k), backend=backend), (1e-4, 0.03, 1e4))
+
+
+def test_the_reference_does_not_depend_on_the_unit() -> None:
+    """Of all but soft lamps, and of a ball by such a lamp, which each take 144 ways to."""
+    hard = SCENE.replace(", radius = 0.3 * k", "")
+    for text in (hard, SOFT):
+
+        def draw(k: float, text: str = text) -> nsg.Image:
+            return nsg.render(nsg.loads(f"let k = {k!r}; {text}"), backend="reference", size=(12, 9))
+
+        hold(draw, (1e-4, 1e4))
 
 
 def test_light_from_everywhere_does_not_depend_on_the_unit() -> None:
