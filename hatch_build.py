@@ -25,7 +25,9 @@ class Made(BuildHookInterface):  # type: ignore[misc, type-arg]
         grammar, kernel = grammar_path(), self._kernel()
         if version == "editable":
             make(grammar, PLACE, source_mark(grammar))
-            kernel.build(Path(self.root, "scenelang", "drawing", kernel.name()))
+            library = Path(self.root, "scenelang", "drawing", kernel.name())
+            if not kernel.is_built(library):
+                kernel.build(library)
             return
         self.folder = tempfile.mkdtemp()
         place = Path(self.folder, "tables.json")

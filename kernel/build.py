@@ -45,6 +45,11 @@ def mark() -> str:
     return total.hexdigest()[:16]
 
 
+def is_built(out: Path) -> bool:
+    """True if a file is the library of these sources."""
+    return out.exists() and mark().encode() in out.read_bytes()
+
+
 def build(out: Path, target: str | None = None, check: bool = False) -> None:
     """Build the library and put it in its place whole; raises RuntimeError with what the compiler said."""
     machine = TARGETS[target][0] if target else platform.machine().lower()
