@@ -251,26 +251,6 @@ def shadows(model: str, scenes: int, side: int, seed: int, out: Path, weights: P
 
 
 @command.command()
-@click.argument("files", nargs=-1, required=True, type=_FILE)
-@click.option(
-    "-o", "--out", type=click.Path(path_type=Path), required=True, metavar="FILE", help="Record to write."
-)
-def plans(files: tuple[Path, ...], out: Path) -> None:
-    """Draw scenes on one thread and record their plans.
-
-    Writes for each FILE what `scenelang dump --costs` says of it, and the meetings, time and PSNR with
-    nothing skipped, with four samples in every pixel, and with hidden objects drawn.
-    """
-    need_metrics()
-    from lab.parsimony import measure_examples
-
-    result = measure_examples(
-        files, lambda plan: click.echo(f"{plan['file']}: {plan['drawing']['ms']:.0f} ms", err=True)
-    )
-    write_json(out, result)
-
-
-@command.command()
 @click.argument("model")
 @_count("--scenes", 50, 1, 10_000, "Number of scenes.")
 @click.option(

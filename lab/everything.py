@@ -37,21 +37,13 @@ STEPS: Final = (
     Step("lab stability textures2d --scenes {few} -o {out}/stability-textures2d"),
     Step("lab stability solids3d --scenes {few} -o {out}/stability-solids3d"),
     Step("lab light --scenes {few} --paths 512 -o {out}/light", needs=("numba",)),
-    Step(
-        "lab bench light_rivals sky --scenes 1 --size 32 --chart {out}/rivals.png -o {out}/rivals.json",
-        needs=("mitsuba", "numba", "pyoidn"),
-    ),
-    Step("lab bench mitsuba_paths {few}", needs=("mitsuba", "numba")),
-    Step("lab bench light_times --scenes 1 -o {out}/light-times.json"),
     Step("lab shadows --scenes {scenes} -o {out}/shadows"),
     Step("lab frontier shapes2d --scenes {scenes} -o {out}/frontier-shapes2d"),
     Step("lab frontier shapes2d --verify --scenes {scenes} -o {out}/frontier-shapes2d"),
     Step("lab frontier solids3d --scenes {few} -o {out}/frontier-solids3d"),
-    Step("lab plans {examples} -o {out}/plans.json"),
     Step("lab fit shapes2d --scenes {few} --params 1 --side 32 -o {out}/fit"),
     Step("lab train shapes2d-reading --budget {budget} -o {out}/train"),
     Step("lab bench floor --exact --frames {few} --scene shapes2d --scene chains"),
-    Step("lab bench circles --rounds 1"),
     Step("lab bench meshes caterpillar --resolution 48", needs=("igl",)),
     Step("lab bench startup {few}"),
     Step("lab bench compile 100 1000 --json {out}/compile.json"),
@@ -71,13 +63,11 @@ ELSEWHERE: Final = {
 
 def command_lines(out: Path, budget: float, scenes: int) -> list[tuple[list[str], Step]]:
     """The words of each step, for a folder, processor minutes of each training and scenes of evaluations."""
-    examples = sorted((ROOT / "examples").glob("*.nsg"))[:scenes]
     fields = {
         "{out}": [str(out)],
         "{budget}": [f"{budget:g}"],
         "{scenes}": [str(scenes)],
         "{few}": [str(max(1, scenes // 20))],
-        "{examples}": [str(path.relative_to(ROOT)) for path in examples],
     }
 
     def words(line: str) -> list[str]:

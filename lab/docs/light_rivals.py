@@ -1,4 +1,4 @@
-"""Pictures under a sky beside path tracers, from what `python -m lab bench light_rivals` recorded."""
+"""Pictures under a sky beside path tracers, from docs/results/light/rivals.json."""
 
 from __future__ import annotations
 

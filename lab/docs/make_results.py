@@ -13,7 +13,7 @@ from collections.abc import Callable
 from functools import partial
 
 from lab import DOCS, RESULTS
-from lab.docs import clusters, costs, fits, make_frontier, parsimony, reported, sizes
+from lab.docs import clusters, costs, fits, make_frontier, passes, reported, sizes
 from lab.docs.tables import markdown
 
 WHAT = {
@@ -121,7 +121,7 @@ BLOCKS: dict[str, Callable[[], str]] = {
     **costs.BLOCKS,
     **fits.BLOCKS,
     **make_frontier.BLOCKS,
-    **parsimony.BLOCKS,
+    **passes.BLOCKS,
     **reported.BLOCKS,
     **sizes.BLOCKS,
     "all": smallest_run,

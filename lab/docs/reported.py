@@ -52,7 +52,7 @@ COMMANDS = (
     ("stability", "stability", "stability-textures2d", "stability-solids3d"),
     ("speed", "models/shapes2d/frontier", "models/solids3d/frontier", "unions-rivals", "solid-rivals"),
     ("promises", "frontier-verified", "frontier-verified-solids"),
-    ("passes", "passes", "plans"),
+    ("passes", "passes"),
 )
 UNSAID = {
     "textures2d/textures2d": "python -m lab eval textures2d --set textures2d --scenes {scenes}",
@@ -62,7 +62,6 @@ UNSAID = {
     "solid-rivals": "python -m lab bench solids",
     "stability": "python -m lab stability shapes2d --scenes {scenes}",
     "stability-textures2d": "python -m lab stability textures2d --only texels --scenes {scenes}",
-    "plans": "python -m lab plans examples/*.nsg",
     "passes": "python -m tests.compiler.prove --scenes {scenes}",
 }
 """Commands of records that were made before records said theirs."""
@@ -89,7 +88,7 @@ def budgets() -> str:
     for model in ("shapes2d", "solids3d"):
         decoder = decoders(told(model)["config"]["network"])
         path, minutes = f"models/{model}/weights", told(model)["seconds"] / 60
-        sizes = [f"{float(numbers(path)):,.0f}", f"{float(kilobytes(path)):.0f}"]
+        sizes = [f"{numbers(path):,}", f"{kilobytes(path):.0f}"]
         rows.append([f"`{model}`", decoder, *sizes, f"{minutes:.0f} minutes of one core"])
     return markdown(("network", "layers of decoders", "numbers", "KB", "training"), rows)
 

@@ -1,16 +1,12 @@
-"""Sets of scenes, decoders with symmetry, masks of shadows, plans of examples."""
+"""Sets of scenes, decoders with symmetry, masks of shadows."""
 
 from __future__ import annotations
 
-import json
 import re
 
 import numpy as np
 import pytest
 
-import scenelang as nsg
-from lab import ROOT
-from lab.parsimony import WAYS, example_plan
 from lab.sets.plane import GEOMETRIES, SETS, random_scene
 from lab.sets.scenes import coverage, interval, scenes_of, sets_of, spread
 from lab.sets.solids import SOLID_SETS
@@ -94,30 +90,6 @@ def test_the_mask_is_what_the_ball_of_mist_darkens() -> None:
     assert mask[surely & (missed < 0.9 * radius)].all()
     assert not mask[surely & (missed > 1.05 * radius)].any()
     assert mask.sum() > 20
-
-
-def test_a_plan_of_an_example() -> None:
-    plan = example_plan(ROOT / "examples/hello.nsg")
-    assert plan["file"] == "hello.nsg"
-    assert plan["rows"] == plan["stages"][-1]["objects"] == 2
-    ways = plan["ways"]
-    assert set(ways) == set(WAYS)
-    assert ways["both"]["meetings"] == 4 * 256**2 * plan["rows"]
-    assert ways["as shipped"]["meetings"] == plan["drawing"]["meetings"]
-    assert ways["as shipped"]["meetings"] < ways["every sample meets every object"]["meetings"]
-    assert ways["four samples in every pixel"]["meetings"] < ways["both"]["meetings"]
-    assert min(way["psnr"] for way in ways.values()) > 40
-
-
-def test_plans_are_of_examples_of_the_plane() -> None:
-    """Those that there were when they were recorded."""
-    plans = json.loads((ROOT / "docs/results/plans.json").read_text("utf-8"))["plans"]
-    flat = {
-        path.name for path in (ROOT / "examples").glob("*.nsg") if nsg.compile(nsg.load(path)).stage is None
-    }
-    files = {plan["file"] for plan in plans}
-    assert files <= flat
-    assert len(files) > 30
 
 
 def test_intervals_hold_the_mean_19_times_in_20() -> None:

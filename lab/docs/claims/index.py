@@ -1,4 +1,0 @@
-"""Figures in docs/index.md."""
-
-CLAIMS: list[str] = []
-GIVEN: dict[str, str] = {}
