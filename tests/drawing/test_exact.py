@@ -172,7 +172,7 @@ def check(scene: nsg.Scene, monkeypatch: pytest.MonkeyPatch) -> None:
 @pytest.mark.parametrize("name", ["shapes2d", "chains", "groups", "twelve", "tree", "wide", "tiny", "strong"])
 def test_pictures_are_those_of_all_objects_everywhere(name: str, monkeypatch: pytest.MonkeyPatch) -> None:
     rng = np.random.default_rng(list(name.encode()))
-    check(random_scene(rng, SETS[name]).model_copy(update={"canvas": (72, 56)}), monkeypatch)
+    check(random_scene(rng, SETS[name]).model_copy(update={"canvas": (56, 40)}), monkeypatch)
 
 
 def test_all_booleans_and_far_coordinates(monkeypatch: pytest.MonkeyPatch) -> None:

@@ -10,11 +10,9 @@ import pytest
 from scenelang.compiler.program import Paint, Program, ProgramError
 from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.neural.draw import draw
-from scenelang.drawing.neural.files import load_arrays
-from scenelang.drawing.neural.load import load_model
 from tests.assets.shapes import noise
 from tests.drawing.slow import Slow
-from tests.drawing.test_field import BLENDED, EQUAL, SCENES, drawn, program
+from tests.drawing.test_field import BLENDED, EQUAL, NETWORKS, SCENES, drawn, program
 
 SLOW = Slow()
 COARSE, FINE = noise(7, 5), noise(64, 48, seed=1)
@@ -26,9 +24,9 @@ STEPS = (
 )
 
 
-@pytest.fixture(scope="module", params=["torch", "numpy"])
+@pytest.fixture(params=NETWORKS)
 def network(request: pytest.FixtureRequest):
-    return load_model("shapes2d").framed if request.param == "torch" else load_arrays("shapes2d").network
+    return NETWORKS[request.param]
 
 
 def dressed(p: Program, paints: list[Paint | None], frames: np.ndarray | None = None) -> Program:
@@ -55,16 +53,17 @@ def at_random(p: Program, seed: int, element=COARSE) -> Program:
 
 
 @pytest.mark.parametrize("name", [name for name in SCENES if "small" not in name])
-def test_the_loop_draws_the_same(network, name: str) -> None:
+def test_the_loop_draws_the_same(name: str) -> None:
     for seed in range(2):
         p = at_random(program(SCENES[name], (23, 18)), seed)
         exact = SLOW.picture(p.vectors, p.tokens, p.canvas, p.paints())
         plain = SLOW.picture(p.vectors, p.tokens, p.canvas)
         assert abs(exact - plain).max() > 0.1
-        everywhere, _ = drawn(network, p, samples="four")
-        np.testing.assert_allclose(everywhere, exact, rtol=0, atol=EQUAL)
-        some, _ = drawn(network, p)
-        np.testing.assert_allclose(some, exact, rtol=0, atol=BLENDED if 1 in p.tokens else EQUAL)
+        for network in NETWORKS.values():
+            everywhere, _ = drawn(network, p, samples="four")
+            np.testing.assert_allclose(everywhere, exact, rtol=0, atol=EQUAL)
+            some, _ = drawn(network, p)
+            np.testing.assert_allclose(some, exact, rtol=0, atol=BLENDED if 1 in p.tokens else EQUAL)
 
 
 def test_inside_an_object_too_a_pixel_is_the_mean_of_four_lookups(network) -> None:
