@@ -216,6 +216,10 @@ void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, cons
         memcpy(clear + from, l->clear, 4 * (size_t)some);
     }
 }
+void NAME(between)(int64_t n, const float *p, const float *normal, const float *view, const float *seen, int32_t values, float *out,
+                   int32_t *fits) {
+    between(n, p, normal, view, seen, values, out, fits);
+}
 // Where n lines from points (3, n) all the way (3, n) meet the surfaces of objects alone, by their numbers: lines and how far
 // along, from 0 to 1, as many as there is room for; their number. Steps are as long as the distance, which changes at rates
 // (n) at most, and at least so small a part (n) of a line.

@@ -4,7 +4,7 @@
 #pragma once
 #include "cone.h"
 #include "shade.h"
-enum { MOST_NEAR = 12, ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes around a place, whole packets of them; rays of it; rays to discs
+enum { ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // whole packets of nodes around a place; rays of it; rays to discs
 #define SURE 0.01f  // world units, as `MarchSettings.gap`
 #define LITTLE 0.02f  // share of a node that is worth a ray
 #define OPEN 0.02f  // of the shares of nodes around a place, that no wall hides; less is dark
@@ -25,9 +25,11 @@ enum { MOST_NEAR = 12, ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes
 #define DIM 1e-4f  // light that is worth few rays
 #define GOLDEN 2.399963f  // radians
 #define PI 3.14159265f
+#define THICK 0.3f  // steps of the lattice: so near lies a point to the plane of another
+#define ALIGNED 0.75f  // cosine: normals farther apart belong to other surfaces
 
 typedef struct { Rows from, way; float begin[BEAM], limit[BEAM], hit[BEAM], depth[BEAM]; int32_t of[BEAM]; } Rays;
-typedef struct { float at[3], normal[3], share[MOST_NEAR], kept; const int32_t *index; int32_t count, ground[4]; } End;
+typedef struct { float at[3], normal[3], share[ROOM], kept; const int32_t *index; const uint8_t *alike; int32_t count, ground[4]; } End;
 typedef struct {
     Rays ray, other;  // those that gather, and those to nodes or from lamps
     Rows light, haze, slope, at, up, colour, sent, lit;  // the last five of places that send rays again
@@ -78,21 +80,41 @@ static int64_t cell_at(const Around *a, const float p[3], const float way[3]) {
         cell = cell * a->counts[d] + (int)fminf(fmaxf((p[d] - a->low[d]) / a->side, 0), a->counts[d] - 1);
     return cell;
 }
+static float sum_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] += r[k + half];
+    return r[0];
+}
+static float most_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] = r[k] > r[k + half] ? r[k] : r[k + half];
+    return r[0];
+}
+IN M groups_of(const uint8_t *alike) {  // of nodes of a cell
+    typedef uint8_t B __attribute__((vector_size(W)));
+    B r;
+    memcpy(&r, alike, sizeof r);
+    return __builtin_convertvector(r, M);
+}
 // Shares of the nodes near a place that face against a way and in whose planes it lies; their cell.
 static int64_t nodes_near(const Around *a, const float p[3], const float way[3], float *share) {
     int64_t cell = cell_at(a, p, way);
-    float room = 0.0625f * a->side * a->side, sum = 0;
-    for (int j = 0; j < a->near; j += W) {
+    float room = 0.0625f * a->side * a->side;
+    F sum = all(0);
+    for (int j = 0; j < ROOM; j += W) {  // those beyond the last weigh nothing
         const float *about = a->about + cell * 7 * ROOM + j;
         V off = {load(about, 0) - p[0], load(about, ROOM) - p[1], load(about, 2 * ROOM) - p[2]};
         V n = {load(about, 3 * ROOM), load(about, 4 * ROOM), load(about, 5 * ROOM)};
         F above = dot(off, n), square = room + dot(off, off) + ASIDE_SQUARED * above * above;
         F facing = max2(-(n.x * way[0] + n.y * way[1] + n.z * way[2]), all(0));
         F part = load(about, 6 * ROOM) * (facing * facing + 1e-5f) / (square * square);
-        for (int k = 0; k < W && j + k < a->near; k++) { share[j + k] = part[k]; sum += part[k]; }
+        keep(share, j, part);
+        sum += part;
     }
-    float each = 1 / fmaxf(sum, 1e-20f);
-    for (int j = 0; j < a->near; j++) share[j] *= each;
+    float each = 1 / fmaxf(sum_of(sum), 1e-20f);
+    for (int j = 0; j < ROOM; j += W) keep(share, j, load(share, j) * each);
     return cell;
 }
 // Nodes of the ground around a place of it, from first to last at FAR sinh(WARP u) / sinh(WARP) along both axes.
@@ -166,13 +188,17 @@ static void ends_of(Gather *w, Level *l, int n) {
         size = fmaxf(sqrtf(size), 1e-9f);
         for (int d = 0; d < 3; d++) way[d] /= size;
         int64_t cell = nodes_near(a, e->at, way, e->share);
-        e->index = a->index + cell * a->near; e->count = a->near;
+        e->index = a->index + cell * a->near; e->alike = a->alike + cell * ROOM; e->count = a->near;
         if (!a->hollow) continue;
         if (others + 2 > BEAM) { open_nodes(w, l, others); others = 0; }
         for (int group = 0; group < 2; group++) {  // of a cell's nodes with no wall between them, one tells of all
             int best = -1;
-            for (int j = 0; j < a->near; j++)
-                if (a->alike[cell * a->near + j] == group && e->share[j] > (best < 0 ? LITTLE : e->share[best])) best = j;
+            float most = LITTLE;
+            for (int j = 0; j < ROOM; j += W) {
+                F part = sel(groups_of(e->alike + j) == group, load(e->share, j), all(0));
+                float here = most_of(part);
+                if (here > most) { most = here; best = j + __builtin_ctz((unsigned)bits(part == here)); }
+            }
             if (best >= 0) to_node(&l->other, others++, e, a->node + e->index[best], 2 * i + group);
         }
     }
@@ -181,15 +207,15 @@ static void ends_of(Gather *w, Level *l, int n) {
     for (int i = 0; i < n; i++) {
         End *e = l->end + i;
         if (e->index == e->ground || !e->count) continue;
-        const uint8_t *alike = a->alike + (e->index - a->index);
         int open = (int)l->part[i];  // bit by bit, of groups
-        float sum = 0;
-        for (int j = 0; j < e->count; j++) {
-            if (!(open >> alike[j] & 1)) e->share[j] = 0;
-            sum += e->share[j];
+        F sum = all(0);
+        for (int j = 0; j < ROOM; j += W) {
+            F part = sel(((open >> groups_of(e->alike + j)) & 1) != 0, load(e->share, j), all(0));
+            keep(e->share, j, part);
+            sum += part;
         }
-        float each = 1 / fmaxf(sum, OPEN);
-        for (int j = 0; j < e->count; j++) e->share[j] *= each;
+        float each = 1 / fmaxf(sum_of(sum), OPEN);
+        for (int j = 0; j < ROOM; j += W) keep(e->share, j, load(e->share, j) * each);
     }
 }
 static void sky_of(const Around *a, float up, float light[3]) {
@@ -499,4 +525,36 @@ static ONCE V mirrored(V at, float radius, V p, V n, F rough, V back, V straight
         }
     }
     return scaled(total, sel(far > radius, all(1 / (radius * radius)), all(0)));
+}
+// What points (3, n) with unit normals have of `values` of a picture's lattice, on the same surface: `view` has the eye, the
+// camera's forward, right and up, pixels of a world unit at a distance of 1, half the picture's sides, the lattice's step in
+// pixels, its columns and rows. With some corners of a cell elsewhere, the others tell how values go on. A point of `seen` is
+// a place, a normal, values, and how these change from it to the next across, and down. `fits` tells where a corner is.
+static void between(int64_t n, const float *p, const float *normal, const float view[18], const float *seen, int values,
+                    float *out, int32_t *fits) {
+    int row = 6 + 3 * values;
+    float step = view[15];
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i), off = minus(q, constant(view));
+        F ahead = max2(dot(off, constant(view + 3)), all(1e-6f)), side = ahead * (step / view[12] * THICK);
+        F u = clamp((view[12] * dot(off, constant(view + 6)) / ahead + view[13]) / step, 0, view[16] - 1.001f);
+        F v = clamp((view[14] - view[12] * dot(off, constant(view + 9)) / ahead) / step, 0, view[17] - 1.001f);
+        F total = all(0), most = all(0), across = all(0), down = all(0), sum[18];
+        for (int k = 0; k < 3 * values; k++) sum[k] = all(0);
+        for (int corner = 0; corner < 4; corner++) {
+            F x = min2(lower(u) + (float)(corner >> 1), all(view[16] - 1)), y = min2(lower(v) + (float)(corner & 1), all(view[17] - 1));
+            M at = cut(y * view[16] + x) * row;
+            V to = {gather(seen, at), gather(seen + 1, at), gather(seen + 2, at)};
+            V face = {gather(seen + 3, at), gather(seen + 4, at), gather(seen + 5, at)};
+            F fit = clamp(2.0f - size_of(dot(minus(to, q), plus(face, up))) / side, 0, 1) * clamp((dot(face, up) - ALIGNED) * 8.0f, 0, 1);
+            F weight = fit * (max2(1.0f - size_of(u - x), all(0)) * max2(1.0f - size_of(v - y), all(0)) + 0.02f);
+            total += weight; most = max2(fit, most);
+            across += weight * (u - x); down += weight * (v - y);
+            for (int k = 0; k < 3 * values; k++) sum[k] += weight * gather(seen + 6 + k, at);
+        }
+        F each = 1.0f / max2(total, all(1e-9f));
+        for (int k = 0; k < values; k++)
+            store(out + k * n, n, i, max2((sum[k] + (across * sum[values + k] + down * sum[2 * values + k]) * each) * each, all(0)));
+        store((float *)fits, n, i, (F)(most > 0.5f));
+    }
 }

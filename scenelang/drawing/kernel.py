@@ -54,7 +54,7 @@ _CALLS: Final = {
         "arriving": ("ipplppippp", ""),
         "glowing": ("ipplppfpppplp", "l"),
     },
-    **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
     **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
 }
@@ -431,6 +431,17 @@ class Kernel:
         places = [part.ctypes.data for part in (*given, light, clear, scratch)]
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
+
+    def between(self, p: Floats, n: Floats, view: Floats, seen: Floats) -> tuple[Floats, npt.NDArray[np.int32]]:
+        """Values (R, M) that points (3, M) with unit normals (3, M) have of a picture's lattice, by its `view`
+        (18,) and what is `seen` at its points (L, 6 + 3R), and where (M,) any of these is on the same surface.
+        """
+        p, n = (np.ascontiguousarray(part, np.float32) for part in (p, n))
+        values, count = seen.shape[1] // 3 - 2, p.shape[1]
+        result, fits = np.empty((values, count), np.float32), np.empty(count, np.int32)
+        places = [part.ctypes.data for part in (p, n, view, seen)]
+        self._library.between(self.variant, count, *places, values, result.ctypes.data, fits.ctypes.data)
+        return result, fits
 
     def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
         """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M)
