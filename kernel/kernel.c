@@ -216,7 +216,11 @@ void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, cons
         memcpy(clear + from, l->clear, 4 * (size_t)some);
     }
 }
-void NAME(between)(int64_t n, const float *p, const float *normal, const float *view, const float *seen, int32_t values, float *out,
+void NAME(evened)(const View *view, const float *p, const float *normal, int32_t rows, const float *values, int32_t step,
+                  int32_t part, float *out) {
+    evened(view, p, normal, rows, values, step, part, out);
+}
+void NAME(between)(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int32_t values, float *out,
                    int32_t *fits) {
     between(n, p, normal, view, seen, values, out, fits);
 }

@@ -27,6 +27,7 @@ enum { ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // whole packets of node
 #define PI 3.14159265f
 #define THICK 0.3f  // steps of the lattice: so near lies a point to the plane of another
 #define ALIGNED 0.75f  // cosine: normals farther apart belong to other surfaces
+#define LEVEL 0.1f  // of squares of steps: planes through few points are as level
 
 typedef struct { Rows from, way; float begin[BEAM], limit[BEAM], hit[BEAM], depth[BEAM]; int32_t of[BEAM]; } Rays;
 typedef struct { float at[3], normal[3], share[ROOM], kept; const int32_t *index; const uint8_t *alike; int32_t count, ground[4]; } End;
@@ -526,27 +527,75 @@ static ONCE V mirrored(V at, float radius, V p, V n, F rough, V back, V straight
     }
     return scaled(total, sel(far > radius, all(1 / (radius * radius)), all(0)));
 }
-// What points (3, n) with unit normals have of `values` of a picture's lattice, on the same surface: `view` has the eye, the
-// camera's forward, right and up, pixels of a world unit at a distance of 1, half the picture's sides, the lattice's step in
-// pixels, its columns and rows. With some corners of a cell elsewhere, the others tell how values go on. A point of `seen` is
-// a place, a normal, values, and how these change from it to the next across, and down. `fits` tells where a corner is.
-static void between(int64_t n, const float *p, const float *normal, const float view[18], const float *seen, int values,
-                    float *out, int32_t *fits) {
-    int row = 6 + 3 * values;
-    float step = view[15];
+// How surely points with unit normals lie on the same surface as others, whose lattice's cells have so long sides.
+IN F on_one(V p, V n, V to, V face, F side) {
+    F off = size_of(dot(minus(to, p), plus(face, n)));
+    return clamp(2.0f - off / (THICK * side), 0, 1) * clamp((dot(face, n) - ALIGNED) * 8.0f, 0, 1);
+}
+IN V gathered3(const float *from, int64_t n, M at) { return (V){gather(from, at), gather(from + n, at), gather(from + 2 * n, at)}; }
+// A picture's lattice, of points row by row: the eye, the camera's forward, right and up, pixels of a world unit at a distance
+// of 1, half the picture's sides, the lattice's step in pixels, its columns and rows.
+typedef struct { float eye[3], forward[3], right[3], up[3], scale, middle[2], step, columns, rows; } View;
+// Rows of values (rows, n) of a lattice's points (3, n) that planes have, by least squares over the points so many steps
+// around that lie on the same surface; parts 1 and 2 are how much a plane rises to the next point across and down.
+static void evened(const View *v, const float *p, const float *normal, int rows, const float *values, int step, int part, float *out) {
+    int32_t columns = (int32_t)v->columns, many = (int32_t)v->rows;
+    int64_t n = (int64_t)columns * many;
     for (int64_t i = 0; i < n; i += W) {
-        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i), off = minus(q, constant(view));
-        F ahead = max2(dot(off, constant(view + 3)), all(1e-6f)), side = ahead * (step / view[12] * THICK);
-        F u = clamp((view[12] * dot(off, constant(view + 6)) / ahead + view[13]) / step, 0, view[16] - 1.001f);
-        F v = clamp((view[14] - view[12] * dot(off, constant(view + 9)) / ahead) / step, 0, view[17] - 1.001f);
+        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i);
+        F side = max2(dot(minus(q, constant(v->eye)), constant(v->forward)), all(1e-6f)) * (v->step / v->scale * step);
+        F fit[9], whole = all(0), x = all(0), y = all(0), xx = all(0), xy = all(0), yy = all(0), share = all(0);
+        M at[9];
+        for (int k = 0; k < 9; k++) {
+            int right = k % 3 - 1, down = k / 3 - 1;
+            for (int w = 0; w < W; w++) {
+                int32_t j = (int32_t)(i + w < n ? i + w : n - 1), c = j % columns + step * right, r = j / columns + step * down;
+                at[k][w] = (r < 0 ? 0 : r < many ? r : many - 1) * columns + (c < 0 ? 0 : c < columns ? c : columns - 1);
+            }
+            fit[k] = on_one(q, up, gathered3(p, n, at[k]), gathered3(normal, n, at[k]), side) * (float)((right ? 1 : 2) * (down ? 1 : 2));
+            whole += fit[k];
+        }
+        whole = 1.0f / max2(whole, all(1e-9f));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            fit[k] *= whole;
+            x += fit[k] * right; y += fit[k] * down;
+            xx += fit[k] * (right * right + LEVEL); xy += fit[k] * (right * down); yy += fit[k] * (down * down + LEVEL);
+        }
+        F less = 1.0f / max2(xx * yy - xy * xy, all(LEVEL * LEVEL));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            F across = fit[k] * less * (yy * right - xy * down), below = fit[k] * less * (xx * down - xy * right);
+            fit[k] = part == 1 ? across : part == 2 ? below : fit[k] - x * across - y * below;
+            share += fit[k];
+        }
+        if (part) fit[4] -= share;
+        else for (int k = 0; k < 9; k++) fit[k] /= max2(share, all(1e-9f));
+        for (int row = 0; row < rows; row++) {
+            F sum = all(0);
+            for (int k = 0; k < 9; k++) sum += fit[k] * gather(values + row * n, at[k]);
+            store(out + row * n, n, i, sum);
+        }
+    }
+}
+// What points (3, n) with unit normals have of `values` of a lattice, on the same surface. With some corners of a cell
+// elsewhere, the others tell how values go on. A point of `seen` is a place, a normal, values, and how these change from it
+// to the next across, and down. `fits` tells where a corner is.
+static void between(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int values, float *out,
+                    int32_t *fits) {
+    int row = 6 + 3 * values;
+    float step = view->step, columns = view->columns, rows = view->rows;
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i), off = minus(q, constant(view->eye));
+        F ahead = max2(dot(off, constant(view->forward)), all(1e-6f)), side = ahead * (step / view->scale);
+        F u = clamp((view->scale * dot(off, constant(view->right)) / ahead + view->middle[0]) / step, 0, columns - 1.001f);
+        F v = clamp((view->middle[1] - view->scale * dot(off, constant(view->up)) / ahead) / step, 0, rows - 1.001f);
         F total = all(0), most = all(0), across = all(0), down = all(0), sum[18];
         for (int k = 0; k < 3 * values; k++) sum[k] = all(0);
         for (int corner = 0; corner < 4; corner++) {
-            F x = min2(lower(u) + (float)(corner >> 1), all(view[16] - 1)), y = min2(lower(v) + (float)(corner & 1), all(view[17] - 1));
-            M at = cut(y * view[16] + x) * row;
-            V to = {gather(seen, at), gather(seen + 1, at), gather(seen + 2, at)};
-            V face = {gather(seen + 3, at), gather(seen + 4, at), gather(seen + 5, at)};
-            F fit = clamp(2.0f - size_of(dot(minus(to, q), plus(face, up))) / side, 0, 1) * clamp((dot(face, up) - ALIGNED) * 8.0f, 0, 1);
+            F x = min2(lower(u) + (float)(corner >> 1), all(columns - 1)), y = min2(lower(v) + (float)(corner & 1), all(rows - 1));
+            M at = cut(y * columns + x) * row;
+            F fit = on_one(q, up, gathered3(seen, 1, at), gathered3(seen + 3, 1, at), side);
             F weight = fit * (max2(1.0f - size_of(u - x), all(0)) * max2(1.0f - size_of(v - y), all(0)) + 0.02f);
             total += weight; most = max2(fit, most);
             across += weight * (u - x); down += weight * (v - y);

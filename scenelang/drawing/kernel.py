@@ -54,7 +54,7 @@ _CALLS: Final = {
         "arriving": ("ipplppippp", ""),
         "glowing": ("ipplppfpppplp", "l"),
     },
-    **{"between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"evened": ("ipppipiip", ""), "between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
     **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
 }
@@ -431,6 +431,20 @@ class Kernel:
         places = [part.ctypes.data for part in (*given, light, clear, scratch)]
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
+
+    def evened(
+        self, view: Floats, p: Floats, n: Floats, values: Floats, step: int = 1, part: int = 0
+    ) -> Floats:
+        """Values (R, L) that planes have, by least squares over a lattice's points (3, L) with unit normals
+        (3, L) so many steps around on the same surface; part 1 and 2 are how much it rises from a point to
+        the next across and down. A `view` (18,) tells of the lattice.
+        """
+        p, n, values = (np.ascontiguousarray(part, np.float32) for part in (p, n, values))
+        assert p.shape[1] == values.shape[1] == int(view[-1]) * int(view[-2])
+        result, rows = np.empty_like(values), len(values)
+        places = [part.ctypes.data for part in (view, p, n)]
+        self._library.evened(self.variant, *places, rows, values.ctypes.data, step, part, result.ctypes.data)
+        return result
 
     def between(self, p: Floats, n: Floats, view: Floats, seen: Floats) -> tuple[Floats, npt.NDArray[np.int32]]:
         """Values (R, M) that points (3, M) with unit normals (3, M) have of a picture's lattice, by its `view`

@@ -67,9 +67,6 @@ EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, in hollows; above it rays are sent again, so often, far above more, turned so
 NOISE, MORE, FURTHER = (0.035, 0.025), (3, 7), np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
-LEVEL = 0.1  # of squares of steps: planes through few points are as level
-THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
-ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
@@ -259,7 +256,7 @@ class Around:
             def received(turn: int) -> Array:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
-            light, self.seen, self.rings = received(0), Seen(p, n), dict[int, tuple[Array, ...]]()
+            light, self.seen = received(0), Seen(p, n)
             self.worth = WORTH * float(light[:3].sum()) / max(len(there), 1)
             glow, free = self.glow(at, up, self.worth)
             whole = float(light[:3].sum()) + float((glow * free).sum())
@@ -412,17 +409,6 @@ class Around:
         )
         return ahead * (step / scale), u, v
 
-    def _alike(self, p: Array, n: Array, index: Array, side: Array) -> Array:
-        """How surely points (3, K) and some of the lattice (K,) lie on the same surface (K,)."""
-        off: Any = 0.0
-        facing: Any = 0.0
-        for axis in range(3):
-            other = self.xp.take(self.seen.n[axis], index)
-            off = off + (self.xp.take(self.seen.p[axis], index) - p[axis]) * (other + n[axis])
-            facing = facing + other * n[axis]
-        fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
-        return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
-
     def _smoothed(self, light: Array) -> Array:
         """Light (3, L) of the lattice without the noise of rays: of points next to each, and of those farther
         off where that changes it by less than the noise (wavelets à trous).
@@ -438,27 +424,8 @@ class Around:
         return even.clip(0.0)
 
     def _evened(self, values: Array, step: int = 1, part: int = 0) -> Array:
-        """Values (R, L) that a plane has, by least squares over the lattice so many steps around on the same
-        surface; part 1 and 2 are how much it rises from a point to the next across and down.
-        """
-        xp, seen, shape = self.xp, self.seen, (self.rows, self.columns)
-        if step not in self.rings:
-            to = np.mgrid[-1:2, -1:2].reshape(2, 9, 1)
-            at = np.indices(shape).reshape(2, 1, -1) + step * to
-            index = [xp.array(each, seen.p) for each in np.ravel_multi_index(tuple(at), shape, mode="clip")]
-            side, bell = step * self._places(seen.p)[0], xp.array(np.float32((2 - abs(to)).prod(0)), seen.p)
-            fit = bell * xp.stack([self._alike(seen.p, seen.n, each, side) for each in index], 0)
-            fit = fit / fit.sum(0).clip(1e-9)
-            v, u = (xp.array(np.float32(each), seen.p) for each in to)
-            uu, uv, vv = ((fit * each).sum(0) for each in (u * u + LEVEL, u * v, v * v + LEVEL))
-            less = fit / (uu * vv - uv * uv).clip(LEVEL**2)
-            across, down = less * (vv * u - uv * v), less * (uu * v - uv * u)
-            mean = fit - (fit * u).sum(0) * across - (fit * v).sum(0) * down
-            for slope in (across, down):
-                slope[4] -= slope.sum(0)
-            self.rings[step] = xp.concat(index, 0), mean / mean.sum(0).clip(1e-9), across, down
-        index, *shares = self.rings[step]
-        return (xp.take(values, index).reshape(len(values), 9, -1) * shares[part]).sum(1)
+        """`Kernel.evened` of values (R, L)."""
+        return load_kernel().evened(self.view, *self.seen, values, step, part)
 
 
 def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples: int) -> float:
