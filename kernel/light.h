@@ -29,6 +29,7 @@ enum { ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // whole packets of node
 #define ALIGNED 0.75f  // cosine: normals farther apart belong to other surfaces
 #define LEVEL 0.1f  // of squares of steps: planes through few points are as level
 
+typedef float Q __attribute__((vector_size(16), aligned(4)));
 typedef struct { Rows from, way; float begin[BEAM], limit[BEAM], hit[BEAM], depth[BEAM]; int32_t of[BEAM]; } Rays;
 typedef struct { float at[3], normal[3], share[ROOM], kept; const int32_t *index; const uint8_t *alike; int32_t count, ground[4]; } End;
 typedef struct {
@@ -237,10 +238,11 @@ static void haze_of(const Around *a, Level *l, int n) {
             end = min2(max2(low, high), end);
         }
         F each = max2(end - begin, all(0)) * (1.0f / steps);
-        if (any(each > 0.0f)) for (int k = 0; k < steps; k++) {
+        int crosses = bits(each > 0.0f);
+        for (int k = 0; k < steps && crosses; k++) {
             V at = plus(from, scaled(way, begin + (k + 0.5f) * each));
             const F *x = &at.x;
-            F part[3], row[4] = {all(0), all(0), all(0), all(0)};
+            F part[3], row[4];
             M index = ints(0);
             for (int d = 0; d < 3; d++) {
                 F u = clamp((x[d] - a->corner[d]) * (1 / a->spacing), 0, a->sides[d] - 1.001f);
@@ -248,17 +250,36 @@ static void haze_of(const Around *a, Level *l, int n) {
                 part[d] = u - floats(low);
                 index = index * a->sides[d] + low;
             }
-            for (int j = 0; j < 8; j++) {
-                F share = (j & 4 ? part[0] : 1.0f - part[0]) * (j & 2 ? part[1] : 1.0f - part[1]) * (j & 1 ? part[2] : 1.0f - part[2]);
-                M place = 4 * (index + (j >> 2) * b * c + (j >> 1 & 1) * c + (j & 1));
-                for (int d = 0; d < 4; d++) row[d] += share * gather(a->haze + d, place);
+            F share[8];
+            float of[4][W];
+            index *= 4;
+            for (int j = 0; j < 8; j++) share[j] = (j & 4 ? part[0] : 1.0f - part[0]) * (j & 2 ? part[1] : 1.0f - part[1]) * (j & 1 ? part[2] : 1.0f - part[2]);
+            for (int w = 0; w < W; w++) {  // four rows of a node at once, of rays that pass the lattice
+                Q sum = {0, 0, 0, 0};
+                for (int j = 0; j < 8 && crosses >> w & 1; j++) sum += share[j][w] * *(const Q *)(a->haze + index[w] + 4 * ((j >> 2) * b * c + (j >> 1 & 1) * c + (j & 1)));
+                for (int d = 0; d < 4; d++) of[d][w] = sum[d];
             }
+            for (int d = 0; d < 4; d++) row[d] = load(of[d], 0);
             F dense = max2(row[3], all(1e-9f)), past = through * exponential(-dense * each), sent = (through - past) / dense;
             light = plus(light, scaled((V){row[0], row[1], row[2]}, sent));
             through = past;
         }
         keep3(&l->haze, i, light);
         keep(l->clear, i, through);
+    }
+}
+// Light of media along parallel lines through the n nodes of a lattice, from each to the next, `far` on in a row of all: of
+// sources here and there, what joins, what surfaces between send back of the light that was, and the part of the next one's
+// that comes through. A share of it is added to the result.
+static void passed_on(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const Q *base,
+                      const Q *surface, const Q *source, const Q *light, Q *along, Q *result) {
+    for (int64_t k = 0; k < n; k++) {
+        int64_t i = far > 0 ? n - 1 - k : k, on = i + far;
+        Q sum = here[i] * source[i] + base[i];
+        if (surface) sum += surface[i] * light[i];
+        if (on >= 0 && on < n) sum += next[i] * source[on] + clear[i] * along[on];
+        along[i] = sum;
+        result[i] += share * sum;
     }
 }
 // Light of lamps, whose middles tell of all of them, at places (n) that send rays again, into `lit`.

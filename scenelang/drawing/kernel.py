@@ -54,7 +54,7 @@ _CALLS: Final = {
         "arriving": ("ipplppippp", ""),
         "glowing": ("ipplppfpppplp", "l"),
     },
-    **{"evened": ("ipppipiip", ""), "between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"passed_on": ("illfppppppppp", ""), "evened": ("ipppipiip", ""), "between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
     **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
 }
@@ -431,6 +431,18 @@ class Kernel:
         places = [part.ctypes.data for part in (*given, light, clear, scratch)]
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
+
+    def passed_on(
+        self, segment: Any, base: Floats, source: Floats, light: Floats, result: Floats
+    ) -> None:
+        """Add to a result (n…, 4) a share of the light that comes to nodes of a lattice along a segment, of
+        what joins, sources, and the light that was (n…, 4).
+        """
+        parts: list[Any] = [segment.here, segment.next, segment.clear, base, segment.surface, source, light]
+        along = np.empty_like(base)
+        assert all(part is None or part.size in (base.size, base.size // 4) for part in parts)
+        places = [None if part is None else part.ctypes.data for part in (*parts, along, result)]
+        self._library.passed_on(self.variant, base.size // 4, segment.far, segment.share, *places)
 
     def evened(
         self, view: Floats, p: Floats, n: Floats, values: Floats, step: int = 1, part: int = 0
