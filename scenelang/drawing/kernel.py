@@ -54,7 +54,8 @@ _CALLS: Final = {
         "arriving": ("ipplppippp", ""),
         "glowing": ("ipplppfpppplp", "l"),
     },
-    **{"passed_on": ("illfppppppppp", ""), "evened": ("ipppipiip", ""), "between": ("ilppppipp", ""), "haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
+    **{"passed_on": ("illfppppppppp", ""), "evened": ("ipppipiip", ""), "between": ("ilppppipp", "")},
+    **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
     **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
 }
@@ -432,9 +433,7 @@ class Kernel:
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
 
-    def passed_on(
-        self, segment: Any, base: Floats, source: Floats, light: Floats, result: Floats
-    ) -> None:
+    def passed_on(self, segment: Any, base: Floats, source: Floats, light: Floats, result: Floats) -> None:
         """Add to a result (n…, 4) a share of the light that comes to nodes of a lattice along a segment, of
         what joins, sources, and the light that was (n…, 4).
         """
@@ -448,8 +447,8 @@ class Kernel:
         self, view: Floats, p: Floats, n: Floats, values: Floats, step: int = 1, part: int = 0
     ) -> Floats:
         """Values (R, L) that planes have, by least squares over a lattice's points (3, L) with unit normals
-        (3, L) so many steps around on the same surface; part 1 and 2 are how much it rises from a point to
-        the next across and down. A `view` (18,) tells of the lattice.
+        (3, L) so many steps around on the same surface; part 1 and 2 are how much these rise from a point to
+        the next across and down. A view (18,) tells of the lattice.
         """
         p, n, values = (np.ascontiguousarray(part, np.float32) for part in (p, n, values))
         assert p.shape[1] == values.shape[1] == int(view[-1]) * int(view[-2])
@@ -458,9 +457,11 @@ class Kernel:
         self._library.evened(self.variant, *places, rows, values.ctypes.data, step, part, result.ctypes.data)
         return result
 
-    def between(self, p: Floats, n: Floats, view: Floats, seen: Floats) -> tuple[Floats, npt.NDArray[np.int32]]:
-        """Values (R, M) that points (3, M) with unit normals (3, M) have of a picture's lattice, by its `view`
-        (18,) and what is `seen` at its points (L, 6 + 3R), and where (M,) any of these is on the same surface.
+    def between(
+        self, p: Floats, n: Floats, view: Floats, seen: Floats
+    ) -> tuple[Floats, npt.NDArray[np.int32]]:
+        """Values (R, M) that points (3, M) with unit normals (3, M) have of a picture's lattice, by its view
+        (18,) and what is seen at its points (L, 6 + 3R), and where (M,) any of these is on the same surface.
         """
         p, n = (np.ascontiguousarray(part, np.float32) for part in (p, n))
         values, count = seen.shape[1] // 3 - 2, p.shape[1]

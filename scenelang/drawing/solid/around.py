@@ -234,8 +234,9 @@ class Around:
         self.step, camera = max(1, round(min(canvas) / side)), self.stage.camera
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
         scale = min(canvas) / 2 / float(np.tan(camera.fov_rad / 2))
-        numbers = scale, canvas[0] / 2, canvas[1] / 2, self.step, self.columns, self.rows
-        self.view = np.array([*camera.eye, *np.ravel(camera.axes()), *numbers], np.float32)
+        sizes = scale, canvas[0] / 2, canvas[1] / 2, self.step, self.columns, self.rows
+        # the kernel's `View`
+        self.view = np.array([*camera.eye, *np.ravel(camera.axes()), *sizes], np.float32)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
             found = self.field.near(p + OFF * n, 0 * p[0] + GAP, every=self.field.mixed)
@@ -425,7 +426,7 @@ class Around:
 
     def _evened(self, values: Array, step: int = 1, part: int = 0) -> Array:
         """`Kernel.evened` of values (R, L)."""
-        return load_kernel().evened(self.view, *self.seen, values, step, part)
+        return load_kernel().evened(self.view, self.seen.p, self.seen.n, values, step, part)
 
 
 def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples: int) -> float:

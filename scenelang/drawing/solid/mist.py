@@ -51,7 +51,7 @@ SHARES: Final = {1: 1 / 15, 3: 3 / 40}, {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}  # o
 
 
 class Segment(NamedTuple):
-    """Ways from all nodes in one direction, each to the next node; arrays are (n…,) or (n…, 4), of light and 0."""
+    """Ways from all nodes in one direction, each to the next node; arrays are (n…,), or of light (n…, 4)."""
 
     share: float
     here: Floats  # parts of the sources at a node and at the next that come along
@@ -200,9 +200,9 @@ class Mist:
                 base += surface * self.received
                 base[:, *to] += self.shining[:, *on] * shown
             through[to] = np.where(stop | self.opaque[to], 0.0, np.exp(-depth))
-            light, back = (None if part is None else _rows(part) for part in (base, surface))
+            back = None if surface is None else _rows(surface)
             far = int(np.dot(shift, self.strides))
-            self.segments.append(Segment(shares[steps], *parts, back, light, through, far))
+            self.segments.append(Segment(shares[steps], parts[0], parts[1], back, _rows(base), through, far))
 
     def relight(self, floor: Callable[[Array], Array] | None = None) -> None:
         """Find the light at the nodes, beginning with what it was; ``floor`` tells what the ground sends
