@@ -26,6 +26,7 @@ from scenelang.drawing.kernel import Exchange, Kernel
 from scenelang.drawing.neural.field import Field
 from scenelang.drawing.neural.tables import WAYS, page_row, tables_of
 from scenelang.drawing.solid.march import MARCH_SETTINGS
+from scenelang.drawing.solid.mist import Segment
 from scenelang.drawing.tables import AROUND, NODE, Tables, stage_rows
 from scenelang.language.evaluation import load
 from scenelang.language.reports import SceneError
@@ -113,9 +114,10 @@ def light_up(
     for name in NODE.names or ():
         nodes[name] = rng.normal(size=nodes[name].shape) * wild
     given = {"node": nodes, "index": rng.integers(0, 9, (cells, near), np.int32)}
-    given |= {"alike": rng.integers(0, 2, (cells, near), np.uint8)}
+    given |= {"alike": rng.integers(0, 2, (cells, 16), np.uint8)}
     sizes = {"about": (cells, 7, 16), "lamp": (2, 7), "disc": (3, 10), "haze": (int(sides.prod()), 4)}
     given |= {name: (rng.normal(size=size) * wild).astype(np.float32) for name, size in sizes.items()}
+    given["about"][:, :, near:] = 0
     values: dict[str, Any] = {
         "side": 0.5,
         "scale": 2.0,
@@ -143,6 +145,17 @@ def light_up(
     if "haze" in values:
         kernel.haze(tables, row, p, way, abs(p[0]))
     kernel.mirrored(p[:, 0], float(rng.choice([0.0, 0.5])), p, way, np.concatenate([p, way, p])[:7])
+    view = np.array([*p[:, 0], *way[:, :3].T.reshape(-1), 20.0, 30.0, 40.0, 3.0, 4.0, 5.0], np.float32)
+    rows, count = int(rng.choice([3, 6])), 20
+    seen = (rng.normal(size=(count, 6 + 3 * rows)) * wild).astype(np.float32)
+    kernel.between(p, way, view, seen)
+    kernel.evened(
+        view, *seen.T[:6].reshape(2, 3, -1), seen.T[6:], int(rng.integers(1, 5)), int(rng.integers(0, 3))
+    )
+    here, light = (rng.random((count, size)).astype(np.float32) for size in (1, 4))
+    far = int(rng.choice([-30, -7, -1, 1, 5, 19]))
+    segment = Segment(0.1, here, here, light if rng.random() < 0.5 else None, light, here, far)
+    kernel.passed_on(segment, light, light * wild, light, 0 * light)
     objects = np.sort(rng.integers(0, int(tables.scene["objects"]), p.shape[1]))
     kernel.crossings(tables, objects, p, way, abs(p[1]), np.full(p.shape[1], 0.1))
 

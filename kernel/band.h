@@ -1,18 +1,21 @@
 // Bands of a picture: rays through pixels' centres, and through more places where these differ from their neighbours.
 #pragma once
 #include "mist.h"
-enum { TILE = 16, CLOSE = 8 };  // pixels of tiles whose rays, and whose further samples, are followed together
+enum { TILE = 16, LOW = 4 };  // pixels of tiles whose rays are followed together; of further samples, rows of such tiles
 
-// Set the way of a ray through a place of the picture, in pixels from its upper left corner.
-static void ray_to(const Stage *e, double x, double y, Rows *way, int at) {
-    double right = (x - 0.5 * e->width) * e->px, up = (0.5 * e->height - y) * e->px;
-    float v[3], square = 0;  // float64 up to here: at 8192 pixels float32 would move samples by a thousandth of a pixel
-    for (int d = 0; d < 3; d++) {
-        v[d] = (float)(e->forward[d] + e->up[d] * up) + (float)(e->right[d] * right);
-        square += v[d] * v[d];
+// The ways of n rays of a block through places of the picture, in pixels from its upper left corner.
+static void rays_to(const Stage *e, const double *x, const double *y, int n, Rows *way) {
+    for (int i = 0; i < n; i += W) {
+        D right, up;
+        V v;
+        memcpy(&right, x + i, sizeof right); memcpy(&up, y + i, sizeof up);
+        right = (right - 0.5 * e->width) * e->px; up = (0.5 * e->height - up) * e->px;
+        // float64 up to here: at 8192 pixels float32 would move samples by a thousandth of one
+        v.x = single(e->forward[0] + e->up[0] * up) + single(e->right[0] * right);
+        v.y = single(e->forward[1] + e->up[1] * up) + single(e->right[1] * right);
+        v.z = single(e->forward[2] + e->up[2] * up) + single(e->right[2] * right);
+        keep3(way, i, over(v, root(dot(v, v))));
     }
-    float length = sqrtf(square);
-    for (int d = 0; d < 3; d++) way->v[d][at] = v[d] / length;
 }
 // Light and alpha along a block of n rays from the eye.
 static void shade_block(Job *j, Beam *b, int n) {
@@ -76,6 +79,7 @@ static void shade_block(Job *j, Beam *b, int n) {
 static void centres(Job *j, int top, int bottom, int first, int last, float *picture) {
     const Stage *e = j->stage;
     size_t plane = (size_t)(bottom - top) * (size_t)e->width, at[BEAM];
+    double across[BEAM], down[BEAM];
     Beam b;
     j->means = e->count > 0;
     for (int row = first; row < last; row += TILE) for (int left = 0; left < e->width; left += TILE) {
@@ -83,9 +87,10 @@ static void centres(Job *j, int top, int bottom, int first, int last, float *pic
         for (int y = row; y < row + TILE && y < last; y += 2)  // in pairs of rows, so that packets are compact
             for (int x = left; x < left + TILE && x < e->width; x++)
                 for (int k = y; k < y + 2 && k < last; k++) {
-                    ray_to(e, x + 0.5, k + 0.5, &b.way, n);
+                    across[n] = x + 0.5; down[n] = k + 0.5;
                     at[n++] = (size_t)(k - top) * (size_t)e->width + (size_t)x;
                 }
+        rays_to(e, across, down, n, &b.way);
         shade_block(j, &b, n);
         for (int i = 0; i < n; i++) {
             for (int d = 0; d < 3; d++) picture[(size_t)d * plane + at[i]] = b.light[0].v[d][i];
@@ -112,19 +117,23 @@ static void written(Job *j, const F *sum, int n, const size_t *at, float *out) {
         j->bad += !(wrong[k] == 0);
     }
 }
-// How much pixels differ from what lies evenly between their neighbours on opposite sides, nearly as bright as it looks.
-static float unevenness(const Stage *e, const float *picture, size_t plane, int from, int rows, int top, int x, int y) {
-    int left = x ? x - 1 : x, right = x + 1 < e->width ? x + 1 : x, above = y ? y - 1 : y, below = y + 1 < e->height ? y + 1 : y;
-    int places[5][2] = {{x, y}, {left, y}, {right, y}, {x, above}, {x, below}};
-    float most = 0, v[5];
+// Pixels of a row from x on that differ, nearly as bright as they look, from what lies evenly between their neighbours on
+// opposite sides; `at` is the row's first of a plane of the picture.
+static int uneven(const Stage *e, const float *picture, size_t plane, int from, int rows, const size_t at[3], int x) {
+    F most = all(0);
+    int last = e->width - 1, inside = x > 0 && x + W <= last;
     for (int row = from; row < rows; row++) {
+        F v[5];  // of pixels, those above, below, left and right
         for (int k = 0; k < 5; k++) {
-            float a = picture[(size_t)row * plane + (size_t)(places[k][1] - top) * (size_t)e->width + (size_t)places[k][0]];
-            v[k] = sqrtf(a > 0 ? a < 1 ? a : 1 : 0);
+            const float *of = picture + (size_t)row * plane + at[k < 3 ? k : 0];
+            int begin = x + (k > 2) * (2 * k - 7);
+            if (inside) v[k] = load(of, begin);
+            else for (int w = 0; w < W; w++) v[k][w] = of[begin + w < 0 ? 0 : begin + w > last ? last : begin + w];
+            v[k] = root(clamp(v[k], 0, 1));
         }
-        most = fmaxf(most, fmaxf(fabsf(v[1] + v[2] - 2 * v[0]), fabsf(v[3] + v[4] - 2 * v[0])));
+        most = greatest(most, size_of(v[3] + v[4] - 2.0f * v[0]), size_of(v[1] + v[2] - 2.0f * v[0]));
     }
-    return most;
+    return bits(most > e->contrast);
 }
 static void finished(Job *j, int top, int bottom, int first, int last, const float *picture, int32_t *pixel, float *out) {
     const Stage *e = j->stage;
@@ -133,20 +142,22 @@ static void finished(Job *j, int top, int bottom, int first, int last, const flo
     for (int64_t i = 0; i < many && !e->every; i += W) {
         F sum[4];
         int n = many - i < W ? (int)(many - i) : W;
-        for (int d = 0; d < 4; d++) for (int k = 0; k < W; k++) {
-            size_t place = (size_t)(first - top) * width + (size_t)(k < n ? i + k : many - 1);
-            sum[d][k] = picture[(size_t)d * plane + place];
-        }
+        for (int d = 0; d < 4; d++) sum[d] = read_row(picture + (size_t)d * plane + (size_t)(first - top) * width, many, i);
         for (int k = 0; k < n; k++) at[k] = channels * (size_t)(i + k);
         written(j, sum, n, at, out);
     }
     if (!e->count) return;
     int from = j->sheets > 1 ? e->transparent ? 3 : 4 : 0, rows = j->sheets > 1 ? 7 : e->transparent ? 4 : 3;
-    for (int row = first; row < last; row += CLOSE) for (int left = 0; left < e->width; left += CLOSE)
-        for (int y = row; y < row + CLOSE && y < last; y++) for (int x = left; x < left + CLOSE && x < e->width; x++)
-            if (e->every || unevenness(e, picture, plane, from, rows, top, x, y) > e->contrast) pixel[count++] = (int32_t)((y - first) * e->width + x);
+    for (int row = first; row < last; row += LOW) for (int left = 0; left < e->width; left += TILE)
+        for (int y = row; y < row + LOW && y < last; y++) for (int x = left; x < left + TILE && x < e->width; x += W) {
+            size_t line = (size_t)(y - top) * width, at[3] = {line, y ? line - width : line, y + 1 < e->height ? line + width : line};
+            int some = (1 << (e->width - x < W ? e->width - x : W)) - 1;
+            for (int m = e->every ? some : some & uneven(e, picture, plane, from, rows, at, x); m; m &= m - 1)
+                pixel[count++] = (y - first) * e->width + x + __builtin_ctz((unsigned)m);
+        }
     j->refined += count;
     int side = (int)lrint(sqrt((double)e->count)), group = e->count < BEAM ? BEAM / e->count : 1, part = BEAM / group;
+    double across[BEAM], down[BEAM];
     Beam b;
     for (int64_t i = 0; i < count; i += group) {
         int n = count - i < group ? (int)(count - i) : group;
@@ -155,8 +166,9 @@ static void finished(Job *j, int top, int bottom, int first, int last, const flo
             int each = e->count - begin < part ? e->count - begin : part, m = 0;
             for (int k = 0; k < n; k++) for (int sample = begin; sample < begin + each; sample++) {
                 int x = pixel[i + k] % e->width, y = first + pixel[i + k] / e->width;
-                ray_to(e, x + (sample % side + 0.5) / side, y + (sample / side + 0.5) / side, &b.way, m++);
+                across[m] = x + (sample % side + 0.5) / side; down[m++] = y + (sample / side + 0.5) / side;
             }
+            rays_to(e, across, down, m, &b.way);
             shade_block(j, &b, m);
             for (int k = 0; k < m; k++) {
                 for (int d = 0; d < 3; d++) sum[d][k / each] += b.light[0].v[d][k];

@@ -22,6 +22,10 @@
     void arriving_##v(const Scene *, const Around *, int64_t, const float *, const float *, int32_t, float *, float *, void *); \
     int64_t glowing_##v(const Scene *, const Around *, int64_t, const float *, const float *, float, float *, float *, int32_t *, \
                         float *, int64_t, void *); \
+    void passed_on_##v(int64_t, int64_t, float, const float *, const float *, const float *, const float *, const float *, \
+                       const float *, const float *, float *, float *); \
+    void evened_##v(const float *, const float *, const float *, int32_t, const float *, int32_t, int32_t, float *); \
+    void between_##v(int64_t, const float *, const float *, const float *, const float *, int32_t, float *, int32_t *); \
     void haze_##v(const Scene *, const Around *, int64_t, const float *, const float *, const float *, float *, float *, void *); \
     int64_t crossings_##v(const Scene *, int64_t, const int32_t *, const float *, const float *, const float *, const float *, int64_t, \
                           int32_t *, float *); \
@@ -102,6 +106,18 @@ OUT void arriving(int32_t variant, const Scene *s, const Around *a, int64_t n, c
 OUT int64_t glowing(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *normal, float worth,
                     float *light, float *free, int32_t *point, float *ray, int64_t room, void *memory) {
     return PICK(glowing, s, a, n, p, normal, worth, light, free, point, ray, room, memory);
+}
+OUT void passed_on(int32_t variant, int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear,
+                   const float *base, const float *surface, const float *source, const float *light, float *along, float *result) {
+    PICK(passed_on, n, far, share, here, next, clear, base, surface, source, light, along, result);
+}
+OUT void evened(int32_t variant, const float *view, const float *p, const float *normal, int32_t rows, const float *values,
+                int32_t step, int32_t part, float *out) {
+    PICK(evened, view, p, normal, rows, values, step, part, out);
+}
+OUT void between(int32_t variant, int64_t n, const float *p, const float *normal, const float *view, const float *seen,
+                 int32_t values, float *out, int32_t *fits) {
+    PICK(between, n, p, normal, view, seen, values, out, fits);
 }
 OUT void haze(int32_t variant, const Scene *s, const Around *a, int64_t n, const float *p, const float *way, const float *reach,
               float *light, float *clear, void *memory) {

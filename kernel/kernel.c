@@ -216,6 +216,19 @@ void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, cons
         memcpy(clear + from, l->clear, 4 * (size_t)some);
     }
 }
+void NAME(passed_on)(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const float *base,
+                     const float *surface, const float *source, const float *light, float *along, float *result) {
+    passed_on(n, far, share, here, next, clear, (const Q *)base, (const Q *)surface, (const Q *)source, (const Q *)light, (Q *)along,
+              (Q *)result);
+}
+void NAME(evened)(const View *view, const float *p, const float *normal, int32_t rows, const float *values, int32_t step,
+                  int32_t part, float *out) {
+    evened(view, p, normal, rows, values, step, part, out);
+}
+void NAME(between)(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int32_t values, float *out,
+                   int32_t *fits) {
+    between(n, p, normal, view, seen, values, out, fits);
+}
 // Where n lines from points (3, n) all the way (3, n) meet the surfaces of objects alone, by their numbers: lines and how far
 // along, from 0 to 1, as many as there is room for; their number. Steps are as long as the distance, which changes at rates
 // (n) at most, and at least so small a part (n) of a line.

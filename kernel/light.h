@@ -4,7 +4,7 @@
 #pragma once
 #include "cone.h"
 #include "shade.h"
-enum { MOST_NEAR = 12, ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes around a place, whole packets of them; rays of it; rays to discs
+enum { ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // whole packets of nodes around a place; rays of it; rays to discs
 #define SURE 0.01f  // world units, as `MarchSettings.gap`
 #define LITTLE 0.02f  // share of a node that is worth a ray
 #define OPEN 0.02f  // of the shares of nodes around a place, that no wall hides; less is dark
@@ -25,9 +25,13 @@ enum { MOST_NEAR = 12, ROOM = 16, AGAIN = 5, DRAWN = 32, FEWEST = 4 };  // nodes
 #define DIM 1e-4f  // light that is worth few rays
 #define GOLDEN 2.399963f  // radians
 #define PI 3.14159265f
+#define THICK 0.3f  // steps of the lattice: so near lies a point to the plane of another
+#define ALIGNED 0.75f  // cosine: normals farther apart belong to other surfaces
+#define LEVEL 0.1f  // of squares of steps: planes through few points are as level
 
+typedef float Q __attribute__((vector_size(16), aligned(4)));
 typedef struct { Rows from, way; float begin[BEAM], limit[BEAM], hit[BEAM], depth[BEAM]; int32_t of[BEAM]; } Rays;
-typedef struct { float at[3], normal[3], share[MOST_NEAR], kept; const int32_t *index; int32_t count, ground[4]; } End;
+typedef struct { float at[3], normal[3], share[ROOM], kept; const int32_t *index; const uint8_t *alike; int32_t count, ground[4]; } End;
 typedef struct {
     Rays ray, other;  // those that gather, and those to nodes or from lamps
     Rows light, haze, slope, at, up, colour, sent, lit;  // the last five of places that send rays again
@@ -78,21 +82,41 @@ static int64_t cell_at(const Around *a, const float p[3], const float way[3]) {
         cell = cell * a->counts[d] + (int)fminf(fmaxf((p[d] - a->low[d]) / a->side, 0), a->counts[d] - 1);
     return cell;
 }
+static float sum_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] += r[k + half];
+    return r[0];
+}
+static float most_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] = r[k] > r[k + half] ? r[k] : r[k + half];
+    return r[0];
+}
+IN M groups_of(const uint8_t *alike) {  // of nodes of a cell
+    typedef uint8_t B __attribute__((vector_size(W)));
+    B r;
+    memcpy(&r, alike, sizeof r);
+    return __builtin_convertvector(r, M);
+}
 // Shares of the nodes near a place that face against a way and in whose planes it lies; their cell.
 static int64_t nodes_near(const Around *a, const float p[3], const float way[3], float *share) {
     int64_t cell = cell_at(a, p, way);
-    float room = 0.0625f * a->side * a->side, sum = 0;
-    for (int j = 0; j < a->near; j += W) {
+    float room = 0.0625f * a->side * a->side;
+    F sum = all(0);
+    for (int j = 0; j < ROOM; j += W) {  // those beyond the last weigh nothing
         const float *about = a->about + cell * 7 * ROOM + j;
         V off = {load(about, 0) - p[0], load(about, ROOM) - p[1], load(about, 2 * ROOM) - p[2]};
         V n = {load(about, 3 * ROOM), load(about, 4 * ROOM), load(about, 5 * ROOM)};
         F above = dot(off, n), square = room + dot(off, off) + ASIDE_SQUARED * above * above;
         F facing = max2(-(n.x * way[0] + n.y * way[1] + n.z * way[2]), all(0));
         F part = load(about, 6 * ROOM) * (facing * facing + 1e-5f) / (square * square);
-        for (int k = 0; k < W && j + k < a->near; k++) { share[j + k] = part[k]; sum += part[k]; }
+        keep(share, j, part);
+        sum += part;
     }
-    float each = 1 / fmaxf(sum, 1e-20f);
-    for (int j = 0; j < a->near; j++) share[j] *= each;
+    float each = 1 / fmaxf(sum_of(sum), 1e-20f);
+    for (int j = 0; j < ROOM; j += W) keep(share, j, load(share, j) * each);
     return cell;
 }
 // Nodes of the ground around a place of it, from first to last at FAR sinh(WARP u) / sinh(WARP) along both axes.
@@ -166,13 +190,17 @@ static void ends_of(Gather *w, Level *l, int n) {
         size = fmaxf(sqrtf(size), 1e-9f);
         for (int d = 0; d < 3; d++) way[d] /= size;
         int64_t cell = nodes_near(a, e->at, way, e->share);
-        e->index = a->index + cell * a->near; e->count = a->near;
+        e->index = a->index + cell * a->near; e->alike = a->alike + cell * ROOM; e->count = a->near;
         if (!a->hollow) continue;
         if (others + 2 > BEAM) { open_nodes(w, l, others); others = 0; }
         for (int group = 0; group < 2; group++) {  // of a cell's nodes with no wall between them, one tells of all
             int best = -1;
-            for (int j = 0; j < a->near; j++)
-                if (a->alike[cell * a->near + j] == group && e->share[j] > (best < 0 ? LITTLE : e->share[best])) best = j;
+            float most = LITTLE;
+            for (int j = 0; j < ROOM; j += W) {
+                F part = sel(groups_of(e->alike + j) == group, load(e->share, j), all(0));
+                float here = most_of(part);
+                if (here > most) { most = here; best = j + __builtin_ctz((unsigned)bits(part == here)); }
+            }
             if (best >= 0) to_node(&l->other, others++, e, a->node + e->index[best], 2 * i + group);
         }
     }
@@ -181,15 +209,15 @@ static void ends_of(Gather *w, Level *l, int n) {
     for (int i = 0; i < n; i++) {
         End *e = l->end + i;
         if (e->index == e->ground || !e->count) continue;
-        const uint8_t *alike = a->alike + (e->index - a->index);
         int open = (int)l->part[i];  // bit by bit, of groups
-        float sum = 0;
-        for (int j = 0; j < e->count; j++) {
-            if (!(open >> alike[j] & 1)) e->share[j] = 0;
-            sum += e->share[j];
+        F sum = all(0);
+        for (int j = 0; j < ROOM; j += W) {
+            F part = sel(((open >> groups_of(e->alike + j)) & 1) != 0, load(e->share, j), all(0));
+            keep(e->share, j, part);
+            sum += part;
         }
-        float each = 1 / fmaxf(sum, OPEN);
-        for (int j = 0; j < e->count; j++) e->share[j] *= each;
+        float each = 1 / fmaxf(sum_of(sum), OPEN);
+        for (int j = 0; j < ROOM; j += W) keep(e->share, j, load(e->share, j) * each);
     }
 }
 static void sky_of(const Around *a, float up, float light[3]) {
@@ -210,10 +238,11 @@ static void haze_of(const Around *a, Level *l, int n) {
             end = min2(max2(low, high), end);
         }
         F each = max2(end - begin, all(0)) * (1.0f / steps);
-        if (any(each > 0.0f)) for (int k = 0; k < steps; k++) {
+        int crosses = bits(each > 0.0f);
+        for (int k = 0; k < steps && crosses; k++) {
             V at = plus(from, scaled(way, begin + (k + 0.5f) * each));
             const F *x = &at.x;
-            F part[3], row[4] = {all(0), all(0), all(0), all(0)};
+            F part[3], row[4];
             M index = ints(0);
             for (int d = 0; d < 3; d++) {
                 F u = clamp((x[d] - a->corner[d]) * (1 / a->spacing), 0, a->sides[d] - 1.001f);
@@ -221,17 +250,36 @@ static void haze_of(const Around *a, Level *l, int n) {
                 part[d] = u - floats(low);
                 index = index * a->sides[d] + low;
             }
-            for (int j = 0; j < 8; j++) {
-                F share = (j & 4 ? part[0] : 1.0f - part[0]) * (j & 2 ? part[1] : 1.0f - part[1]) * (j & 1 ? part[2] : 1.0f - part[2]);
-                M place = 4 * (index + (j >> 2) * b * c + (j >> 1 & 1) * c + (j & 1));
-                for (int d = 0; d < 4; d++) row[d] += share * gather(a->haze + d, place);
+            F share[8];
+            float of[4][W];
+            index *= 4;
+            for (int j = 0; j < 8; j++) share[j] = (j & 4 ? part[0] : 1.0f - part[0]) * (j & 2 ? part[1] : 1.0f - part[1]) * (j & 1 ? part[2] : 1.0f - part[2]);
+            for (int w = 0; w < W; w++) {  // four rows of a node at once, of rays that pass the lattice
+                Q sum = {0, 0, 0, 0};
+                for (int j = 0; j < 8 && crosses >> w & 1; j++) sum += share[j][w] * *(const Q *)(a->haze + index[w] + 4 * ((j >> 2) * b * c + (j >> 1 & 1) * c + (j & 1)));
+                for (int d = 0; d < 4; d++) of[d][w] = sum[d];
             }
+            for (int d = 0; d < 4; d++) row[d] = load(of[d], 0);
             F dense = max2(row[3], all(1e-9f)), past = through * exponential(-dense * each), sent = (through - past) / dense;
             light = plus(light, scaled((V){row[0], row[1], row[2]}, sent));
             through = past;
         }
         keep3(&l->haze, i, light);
         keep(l->clear, i, through);
+    }
+}
+// Light of media along parallel lines through the n nodes of a lattice, from each to the next, `far` on in a row of all: of
+// sources here and there, what joins, what surfaces between send back of the light that was, and the part of the next one's
+// that comes through. A share of it is added to the result.
+static void passed_on(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const Q *base,
+                      const Q *surface, const Q *source, const Q *light, Q *along, Q *result) {
+    for (int64_t k = 0; k < n; k++) {
+        int64_t i = far > 0 ? n - 1 - k : k, on = i + far;
+        Q sum = here[i] * source[i] + base[i];
+        if (surface) sum += surface[i] * light[i];
+        if (on >= 0 && on < n) sum += next[i] * source[on] + clear[i] * along[on];
+        along[i] = sum;
+        result[i] += share * sum;
     }
 }
 // Light of lamps, whose middles tell of all of them, at places (n) that send rays again, into `lit`.
@@ -499,4 +547,84 @@ static ONCE V mirrored(V at, float radius, V p, V n, F rough, V back, V straight
         }
     }
     return scaled(total, sel(far > radius, all(1 / (radius * radius)), all(0)));
+}
+// How surely points with unit normals lie on the same surface as others, whose lattice's cells have so long sides.
+IN F on_one(V p, V n, V to, V face, F side) {
+    F off = size_of(dot(minus(to, p), plus(face, n)));
+    return clamp(2.0f - off / (THICK * side), 0, 1) * clamp((dot(face, n) - ALIGNED) * 8.0f, 0, 1);
+}
+IN V gathered3(const float *from, int64_t n, M at) { return (V){gather(from, at), gather(from + n, at), gather(from + 2 * n, at)}; }
+// A picture's lattice, of points row by row: the eye, the camera's forward, right and up, pixels of a world unit at a distance
+// of 1, half the picture's sides, the lattice's step in pixels, its columns and rows.
+typedef struct { float eye[3], forward[3], right[3], up[3], scale, middle[2], step, columns, rows; } View;
+// Rows of values (rows, n) of a lattice's points (3, n) that planes have, by least squares over the points so many steps
+// around that lie on the same surface; parts 1 and 2 are how much a plane rises to the next point across and down.
+static void evened(const View *v, const float *p, const float *normal, int rows, const float *values, int step, int part, float *out) {
+    int32_t columns = (int32_t)v->columns, many = (int32_t)v->rows;
+    int64_t n = (int64_t)columns * many;
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i);
+        F side = max2(dot(minus(q, constant(v->eye)), constant(v->forward)), all(1e-6f)) * (v->step / v->scale * step);
+        F fit[9], whole = all(0), x = all(0), y = all(0), xx = all(0), xy = all(0), yy = all(0), share = all(0);
+        M at[9];
+        for (int k = 0; k < 9; k++) {
+            int right = k % 3 - 1, down = k / 3 - 1;
+            for (int w = 0; w < W; w++) {
+                int32_t j = (int32_t)(i + w < n ? i + w : n - 1), c = j % columns + step * right, r = j / columns + step * down;
+                at[k][w] = (r < 0 ? 0 : r < many ? r : many - 1) * columns + (c < 0 ? 0 : c < columns ? c : columns - 1);
+            }
+            fit[k] = on_one(q, up, gathered3(p, n, at[k]), gathered3(normal, n, at[k]), side) * (float)((right ? 1 : 2) * (down ? 1 : 2));
+            whole += fit[k];
+        }
+        whole = 1.0f / max2(whole, all(1e-9f));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            fit[k] *= whole;
+            x += fit[k] * right; y += fit[k] * down;
+            xx += fit[k] * (right * right + LEVEL); xy += fit[k] * (right * down); yy += fit[k] * (down * down + LEVEL);
+        }
+        F less = 1.0f / max2(xx * yy - xy * xy, all(LEVEL * LEVEL));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            F across = fit[k] * less * (yy * right - xy * down), below = fit[k] * less * (xx * down - xy * right);
+            fit[k] = part == 1 ? across : part == 2 ? below : fit[k] - x * across - y * below;
+            share += fit[k];
+        }
+        if (part) fit[4] -= share;
+        else for (int k = 0; k < 9; k++) fit[k] /= max2(share, all(1e-9f));
+        for (int row = 0; row < rows; row++) {
+            F sum = all(0);
+            for (int k = 0; k < 9; k++) sum += fit[k] * gather(values + row * n, at[k]);
+            store(out + row * n, n, i, sum);
+        }
+    }
+}
+// What points (3, n) with unit normals have of `values` of a lattice, on the same surface. With some corners of a cell
+// elsewhere, the others tell how values go on. A point of `seen` is a place, a normal, values, and how these change from it
+// to the next across, and down. `fits` tells where a corner is.
+static void between(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int values, float *out,
+                    int32_t *fits) {
+    int row = 6 + 3 * values;
+    float step = view->step, columns = view->columns, rows = view->rows;
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i), off = minus(q, constant(view->eye));
+        F ahead = max2(dot(off, constant(view->forward)), all(1e-6f)), side = ahead * (step / view->scale);
+        F u = clamp((view->scale * dot(off, constant(view->right)) / ahead + view->middle[0]) / step, 0, columns - 1.001f);
+        F v = clamp((view->middle[1] - view->scale * dot(off, constant(view->up)) / ahead) / step, 0, rows - 1.001f);
+        F total = all(0), most = all(0), across = all(0), down = all(0), sum[18];
+        for (int k = 0; k < 3 * values; k++) sum[k] = all(0);
+        for (int corner = 0; corner < 4; corner++) {
+            F x = min2(lower(u) + (float)(corner >> 1), all(columns - 1)), y = min2(lower(v) + (float)(corner & 1), all(rows - 1));
+            M at = cut(y * columns + x) * row;
+            F fit = on_one(q, up, gathered3(seen, 1, at), gathered3(seen + 3, 1, at), side);
+            F weight = fit * (max2(1.0f - size_of(u - x), all(0)) * max2(1.0f - size_of(v - y), all(0)) + 0.02f);
+            total += weight; most = max2(fit, most);
+            across += weight * (u - x); down += weight * (v - y);
+            for (int k = 0; k < 3 * values; k++) sum[k] += weight * gather(seen + 6 + k, at);
+        }
+        F each = 1.0f / max2(total, all(1e-9f));
+        for (int k = 0; k < values; k++)
+            store(out + k * n, n, i, max2((sum[k] + (across * sum[values + k] + down * sum[2 * values + k]) * each) * each, all(0)));
+        store((float *)fits, n, i, (F)(most > 0.5f));
+    }
 }

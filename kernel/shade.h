@@ -14,8 +14,9 @@ typedef struct {  // points that light, in two sheets where there are textures: 
     float alpha[BEAM], clear[BEAM];  // what these let through
     int32_t edge[BEAM], reached[BEAM];  // where a medium gives way to a surface; lamps that it sees, as bits
     Rows way;  // of rays from the eye, then of those from a lamp to points, which are numbered:
-    float far[BEAM], received[BEAM];
+    float far[BEAM];
     int32_t point[BEAM];
+    float received[BEAM], part[BEAM];  // what points receive of a lamp that nothing hides, and the part that arrives
 } Beam;
 typedef struct {  // what a call draws, and its scratch
     const Scene *s, *opaque;
@@ -202,7 +203,7 @@ static ONCE F reaching(Job *j, Beam *b, const Lamp *lamp, int i, int listed, M t
     V at = constant(lamp->at), way = load3(&b->way, i), n = {all(0), all(0), all(0)};
     F far = load(b->far, i);
     M edge = ints(0);
-    for (int k = 0; k < W; k++) if (there[k]) {
+    if (lamp->radius > 0 || s->media) for (int k = 0; k < W; k++) if (there[k]) {
         int m = b->point[i + k];
         n.x[k] = b->n.v[0][m]; n.y[k] = b->n.v[1][m]; n.z[k] = b->n.v[2][m]; edge[k] = b->edge[m];
     }
@@ -249,6 +250,7 @@ static void light_up(Job *j, Beam *b, int n, int media) {
             to = plus(to, scaled(normal, all(stage->lift)));
             F far = root(dot(to, to)), bright = all(0);
             to = scaled(to, 1.0f / max2(far, all(1e-9f)));
+            keep(b->received, i, received); keep(b->part, i, all(0));
             for (int k = 0; k < j->sheets; k++) {
                 V c = load3(&b->colour[k], i);
                 bright += c.x * lamp->power[0] + c.y * lamp->power[1] + c.z * lamp->power[2];
@@ -257,7 +259,7 @@ static void light_up(Job *j, Beam *b, int n, int media) {
                 int k = __builtin_ctz((unsigned)m);
                 if (i + k >= n) break;
                 b->way.v[0][lit] = to.x[k]; b->way.v[1][lit] = to.y[k]; b->way.v[2][lit] = to.z[k];
-                b->far[lit] = far[k]; b->received[lit] = received[k]; b->point[lit++] = i + k;
+                b->far[lit] = far[k]; b->point[lit++] = i + k;
             }
         }
         if (!lit) continue;
@@ -271,11 +273,17 @@ static void light_up(Job *j, Beam *b, int n, int media) {
             M there = ints(0);
             for (int k = 0; k < W && i + k < lit; k++) there[k] = -1;
             F clear = reaching(j, b, lamp, i, listed, there, media);
-            for (int k = 0; k < W && i + k < lit; k++) if (clear[k] > 0) {
-                int m = b->point[i + k];
-                b->reached[m] |= 1 << l;
-                for (int sheet = 0; sheet < j->sheets; sheet++)
-                    for (int d = 0; d < 3; d++) b->light[sheet].v[d][m] += clear[k] * b->received[i + k] * lamp->power[d] * b->colour[sheet].v[d][m];
+            for (int k = 0; k < W && i + k < lit; k++) b->part[b->point[i + k]] = clear[k];
+        }
+        for (int i = 0; i < n; i += W) {
+            F clear = load(b->part, i), part = clear * load(b->received, i);
+            M some = clear > 0.0f;
+            if (!any(some)) continue;
+            keep((float *)b->reached, i, (F)((M)load((float *)b->reached, i) | (some & (1 << l))));
+            for (int k = 0; k < j->sheets; k++) {
+                V c = load3(&b->colour[k], i), sum = load3(&b->light[k], i);
+                V more = {part * lamp->power[0] * c.x, part * lamp->power[1] * c.y, part * lamp->power[2] * c.z};
+                keep3(&b->light[k], i, choose(some, plus(sum, more), sum));
             }
         }
     }

@@ -14,6 +14,7 @@
 #define IN static inline __attribute__((always_inline))
 typedef float F __attribute__((vector_size(4 * W), aligned(4 * W)));
 typedef int32_t M __attribute__((vector_size(4 * W), aligned(4 * W)));  // a mask (-1 or 0), or integers
+typedef double D __attribute__((vector_size(8 * W), aligned(8 * W)));
 typedef struct { F x, y, z; } V;
 #define BIG 1e30f
 
@@ -65,6 +66,7 @@ IN V pulled(const float m[9], V g) {  // a gradient back through a matrix: its t
                m[2] * g.x + m[5] * g.y + m[8] * g.z};
 }
 IN M cut(F a) { return __builtin_convertvector(a, M); }  // towards zero, of numbers that fit
+IN F single(D a) { return __builtin_convertvector(a, F); }
 IN F floats(M a) { return __builtin_convertvector(a, F); }
 IN F gather(const float *from, M at) { F r; for (int i = 0; i < W; i++) r[i] = from[at[i]]; return r; }
 IN void sines(F a, F *s, F *c) {  // of |a| up to some thousands: Cody and Waite's reduction, then Cephes' polynomials
@@ -98,12 +100,16 @@ IN F logarithm(F x) {  // of normal x > 0, within 1e-7 of itself or of 1: Cephes
     F k = floats(e);
     return m + (y * m * z - 2.12194440e-4f * k - 0.5f * z) + 0.693359375f * k;
 }
-IN void read_points(const float *p, int64_t n, int64_t at, V *q) {  // the last point stands for those behind it
-    for (int k = 0; k < W; k++) {
-        int64_t j = at + k < n ? at + k : n - 1;
-        q->x[k] = p[j]; q->y[k] = p[n + j]; q->z[k] = p[2 * n + j];
-    }
+IN F read_row(const float *p, int64_t end, int64_t at) {  // the last number stands for those behind it
+    F r;
+    if (at + W <= end) memcpy(&r, p + at, sizeof r);
+    else for (int k = 0; k < W; k++) r[k] = p[at + k < end ? at + k : end - 1];
+    return r;
 }
+IN V read_some(const float *p, int64_t n, int64_t end, int64_t at) {
+    return (V){read_row(p, end, at), read_row(p + n, end, at), read_row(p + 2 * n, end, at)};
+}
+IN void read_points(const float *p, int64_t n, int64_t at, V *q) { *q = read_some(p, n, n, at); }
 IN void store(float *to, int64_t n, int64_t at, F values) {
     if (at + W <= n) memcpy(to + at, &values, sizeof values);
     else memcpy(to + at, &values, 4 * (size_t)(n - at));

@@ -54,6 +54,7 @@ _CALLS: Final = {
         "arriving": ("ipplppippp", ""),
         "glowing": ("ipplppfpppplp", "l"),
     },
+    **{"passed_on": ("illfppppppppp", ""), "evened": ("ipppipiip", ""), "between": ("ilppppipp", "")},
     **{"haze": ("ipplpppppp", ""), "crossings": ("iplppppplpp", "l")},
     **{"mirrored": ("ilpfpppppp", "")},
     **{"plane": ("ippiipppp", ""), "states": ("iplpfpp", "")},
@@ -431,6 +432,43 @@ class Kernel:
         places = [part.ctypes.data for part in (*given, light, clear, scratch)]
         self._library.haze(self.variant, scene, around.ctypes.data, len(clear), *places)
         return light, clear
+
+    def passed_on(self, segment: Any, base: Floats, source: Floats, light: Floats, result: Floats) -> None:
+        """Add to a result (n…, 4) a share of the light that comes to nodes of a lattice along a segment, of
+        what joins, sources, and the light that was (n…, 4).
+        """
+        parts: list[Any] = [segment.here, segment.next, segment.clear, base, segment.surface, source, light]
+        along = np.empty_like(base)
+        assert all(part is None or part.size in (base.size, base.size // 4) for part in parts)
+        places = [None if part is None else part.ctypes.data for part in (*parts, along, result)]
+        self._library.passed_on(self.variant, base.size // 4, segment.far, segment.share, *places)
+
+    def evened(
+        self, view: Floats, p: Floats, n: Floats, values: Floats, step: int = 1, part: int = 0
+    ) -> Floats:
+        """Values (R, L) that planes have, by least squares over a lattice's points (3, L) with unit normals
+        (3, L) so many steps around on the same surface; part 1 and 2 are how much these rise from a point to
+        the next across and down. A view (18,) tells of the lattice.
+        """
+        p, n, values = (np.ascontiguousarray(part, np.float32) for part in (p, n, values))
+        assert p.shape[1] == values.shape[1] == int(view[-1]) * int(view[-2])
+        result, rows = np.empty_like(values), len(values)
+        places = [part.ctypes.data for part in (view, p, n)]
+        self._library.evened(self.variant, *places, rows, values.ctypes.data, step, part, result.ctypes.data)
+        return result
+
+    def between(
+        self, p: Floats, n: Floats, view: Floats, seen: Floats
+    ) -> tuple[Floats, npt.NDArray[np.int32]]:
+        """Values (R, M) that points (3, M) with unit normals (3, M) have of a picture's lattice, by its view
+        (18,) and what is seen at its points (L, 6 + 3R), and where (M,) any of these is on the same surface.
+        """
+        p, n = (np.ascontiguousarray(part, np.float32) for part in (p, n))
+        values, count = seen.shape[1] // 3 - 2, p.shape[1]
+        result, fits = np.empty((values, count), np.float32), np.empty(count, np.int32)
+        places = [part.ctypes.data for part in (p, n, view, seen)]
+        self._library.between(self.variant, count, *places, values, result.ctypes.data, fits.ctypes.data)
+        return result, fits
 
     def mirrored(self, at: Floats, radius: float, p: Floats, n: Floats, coat: Floats) -> Floats:
         """Light (R, M) of a lamp at a point (3,) of a radius and power 1 that rough mirrors at points (3, M)

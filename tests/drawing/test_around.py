@@ -10,6 +10,7 @@ import pytest
 import scenelang as nsg
 from scenelang.compiler.spaces import Sky, Stage
 from scenelang.drawing.arrays import NUMPY
+from scenelang.drawing.kernel import load_kernel
 from scenelang.drawing.neural import draw
 from scenelang.drawing.solid.around import FURTHER, GOLDEN, TURNS, Around, disc
 from scenelang.drawing.solid.draw import Lighting
@@ -104,11 +105,12 @@ def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
     with NUMPY.inference():
         parts = [around._evened(plane, part=part) for part in range(3)]
         assert parts[0][:, there] == pytest.approx(plane[:, there], abs=0.2)
-        around.seen = around.seen._replace(received=np.concatenate([plane, *parts[1:]]))
+        lattice = np.ascontiguousarray(np.concatenate([*around.seen, plane, *parts[1:]]).T, np.float32)
         x = np.linspace(-0.74, 0.74, 150, dtype=np.float32)  # the top's sides are at 0.75
         p = np.stack([np.tile(x, 150), np.full(22500, 1.3 / 3**0.5, np.float32), np.repeat(x, 150)])
-        side, u, v = around._places(p)
-        found, fits = around._between(p, np.float32([[0], [1], [0]]) + 0 * p, side, u, v)
+        _, u, v = around._places(p)
+        n = np.float32([[0], [1], [0]]) + 0 * p
+        found, fits = load_kernel().between(p, n, around.view, lattice)
     assert fits.all()
     assert found == pytest.approx(np.stack([10 + u, 10 + v, 50 + v - u / 2]), abs=0.15)
 
@@ -217,7 +219,7 @@ def test_no_light_comes_into_what_is_closed(sky: str) -> None:
     inside = (around.nodes.n * around.nodes.p).sum(0) < 0
     assert inside.sum() > 100
     assert np.all(around.exchange[1][:, inside] == 0)
-    assert np.all(around.seen.received == 0)
+    assert np.all(around.lattice[:, 6:] == 0)
 
 
 def test_nodes_on_the_outside_of_a_thin_slab_see_all_of_the_sky() -> None:

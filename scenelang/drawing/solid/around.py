@@ -67,9 +67,6 @@ EIGHTHS = 8  # of pixels are places told apart by
 # of the light on the lattice, in hollows; above it rays are sent again, so often, far above more, turned so
 NOISE, MORE, FURTHER = (0.035, 0.025), (3, 7), np.array([[1.3756], [-0.5877]])
 WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by which they change light
-LEVEL = 0.1  # of squares of steps: planes through few points are as level
-THICK = 0.3  # steps of the lattice: so near lies a point to the plane of another
-ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
@@ -121,8 +118,8 @@ class Lookup:
             chosen = np.argpartition(off + AWAY * (along > -TURNED), count - 1, 1)[:, :count]
             found.append(np.take_along_axis(close, chosen, 1))
         self.index = np.concatenate(found, dtype=np.int32)  # (6 cells, k)
-        # whether no wall is between nodes and the first of their cell (6 cells, k)
-        self.alike = np.zeros(self.index.shape, np.uint8)
+        # whether no wall is between nodes and the first of their cell (6 cells, 16)
+        self.alike = np.zeros((len(self.index), 16), np.uint8)
         # positions, normals and weights of a cell's nodes, in whole packets (6 cells, 7, 16)
         self.about = np.zeros((len(self.index), 7, 16), np.float32)
         rows = np.concatenate([nodes.p, nodes.n, nodes.weight[None]])[:, self.index]
@@ -134,9 +131,6 @@ class Seen(NamedTuple):
 
     p: Array  # (3, L); where there is nothing, far away
     n: Array  # (3, L) unit normals
-    # (R, L) from everywhere, and if something glows the parts of its light that nothing hides; then how these
-    # change from a point to the next across, and down
-    received: Array
 
 
 class Around:
@@ -179,7 +173,7 @@ class Around:
             index = self.lookup.index
             first = np.broadcast_to(index[:, :1], index.shape).reshape(-1)
             free = self._open(own.p[:, first], own.n[:, first], index.reshape(-1))
-            self.lookup.alike[:] = free.reshape(index.shape)
+            self.lookup.alike[:, : index.shape[1]] = free.reshape(index.shape)
         self._tell(0 * self.nodes.p)
         self.exchange = self._exchange(RAYS[self.hollow])
 
@@ -237,8 +231,12 @@ class Around:
         by places of the picture in pixels.
         """
         side, rays = LATTICE[2 if self.hollow or (self.mist and self.mist.lit) else int(self.emitters.there)]
-        self.canvas, self.step = canvas, max(1, round(min(canvas) / side))
+        self.step, camera = max(1, round(min(canvas) / side)), self.stage.camera
         self.columns, self.rows = (-(-side // self.step) + 1 for side in canvas)
+        scale = min(canvas) / 2 / float(np.tan(camera.fov_rad / 2))
+        sizes = scale, canvas[0] / 2, canvas[1] / 2, self.step, self.columns, self.rows
+        # the kernel's `View`
+        self.view = np.array([*camera.eye, *np.ravel(camera.axes()), *sizes], np.float32)
         with self.xp.inference():
             p, n = places(np.arange(self.columns) * self.step, np.arange(self.rows)[:, None] * self.step)
             found = self.field.near(p + OFF * n, 0 * p[0] + GAP, every=self.field.mixed)
@@ -259,7 +257,7 @@ class Around:
             def received(turn: int) -> Array:
                 return everywhere(self.gathered(at, up, numbers + turn * FURTHER, rays))
 
-            light, self.seen, self.rings = received(0), Seen(p, n, p), dict[int, tuple[Array, ...]]()
+            light, self.seen = received(0), Seen(p, n)
             self.worth = WORTH * float(light[:3].sum()) / max(len(there), 1)
             glow, free = self.glow(at, up, self.worth)
             whole = float(light[:3].sum()) + float((glow * free).sum())
@@ -271,7 +269,9 @@ class Around:
             every = [light, everywhere(free)] if self.emitters.there else [light]
             even = self.xp.concat([self._smoothed(each) for each in every], 0)
             slopes = [self._evened(even, part=part) for part in (1, 2)]
-            self.seen = Seen(p, n, self.xp.concat([even, *slopes], 0))
+            # of each point what comes from everywhere, and if something glows the parts of its light that
+            # nothing hides; then how these change from it to the next across, and down
+            self.lattice = np.ascontiguousarray(np.concatenate([p, n, even, *slopes]).T, np.float32)
 
     def sky(self, way: Array) -> Array:
         """Light of the sky (3, …) from directions (3, …)."""
@@ -343,15 +343,13 @@ class Around:
         if self.seen is None:
             numbers = np.stack([np.arange(p.shape[1])] * 2)
             return self.gathered(p, n, numbers, POINT_RAYS)[:3] + self._glowing(p, n)
-        side, u, v = self._places(p)
-        result, fits = self._between(p, n, side, u, v)
-        alone = xp.where(~fits)
+        result, fits = load_kernel().between(p, n, self.view, self.lattice)
+        alone = xp.where(fits == 0)
         if len(alone) and not (last or self.emitters.there):
             xp.put(result, alone, 0 * xp.take(result, alone) + UNKNOWN)
         elif len(alone):
-            at = np.asarray(xp.to_numpy(xp.take(xp.stack([u, v], 0), alone)), np.float64)
-            numbers = np.rint(at * (EIGHTHS * self.step))
             here, up = xp.take(p, alone), xp.take(n, alone)
+            numbers = np.rint(np.asarray(self._places(here)[1:], np.float64) * (EIGHTHS * self.step))
             xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow)[:3])
             result[3:, alone] = self.glow(here, up, self.worth)[1][: len(result) - 3]
         if not self.emitters.there:
@@ -403,27 +401,14 @@ class Around:
 
     def _places(self, p: Array) -> tuple[Array, Array, Array]:
         """Sides (K,) in world units of cells of the lattice where points (3, K) are, and their places."""
-        xp, camera, (width, height) = self.xp, self.stage.camera, self.canvas
-        axes = xp.array(np.array([camera.eye, *camera.axes()], np.float32), p)
-        forward, right, up = axes[1:] @ (p - axes[0][:, None])
-        scale = min(self.canvas) / 2 / float(np.tan(camera.fov_rad / 2))
+        scale, *middle, step, columns, rows = self.view[12:].tolist()
+        forward, right, up = self.view[3:12].reshape(3, 3) @ (p - self.view[:3, None])
         ahead = forward.clip(1e-6)
         u, v = (
-            ((scale * off / ahead + side / 2) / self.step).clip(0.0, count - 1.001)
-            for off, side, count in ((right, width, self.columns), (-up, height, self.rows))
+            ((scale * off / ahead + half) / step).clip(0.0, count - 1.001)
+            for off, half, count in zip((right, -up), middle, (columns, rows), strict=True)
         )
-        return ahead * (self.step / scale), u, v
-
-    def _alike(self, p: Array, n: Array, index: Array, side: Array) -> Array:
-        """How surely points (3, K) and some of the lattice (K,) lie on the same surface (K,)."""
-        off: Any = 0.0
-        facing: Any = 0.0
-        for axis in range(3):
-            other = self.xp.take(self.seen.n[axis], index)
-            off = off + (self.xp.take(self.seen.p[axis], index) - p[axis]) * (other + n[axis])
-            facing = facing + other * n[axis]
-        fit = (2 - abs(off) / (THICK * side)).clip(0.0, 1.0)
-        return fit * ((facing - ALIGNED) * 8).clip(0.0, 1.0)
+        return ahead * (step / scale), u, v
 
     def _smoothed(self, light: Array) -> Array:
         """Light (3, L) of the lattice without the noise of rays: of points next to each, and of those farther
@@ -440,48 +425,8 @@ class Around:
         return even.clip(0.0)
 
     def _evened(self, values: Array, step: int = 1, part: int = 0) -> Array:
-        """Values (R, L) that a plane has, by least squares over the lattice so many steps around on the same
-        surface; part 1 and 2 are how much it rises from a point to the next across and down.
-        """
-        xp, seen, shape = self.xp, self.seen, (self.rows, self.columns)
-        if step not in self.rings:
-            to = np.mgrid[-1:2, -1:2].reshape(2, 9, 1)
-            at = np.indices(shape).reshape(2, 1, -1) + step * to
-            index = [xp.array(each, seen.p) for each in np.ravel_multi_index(tuple(at), shape, mode="clip")]
-            side, bell = step * self._places(seen.p)[0], xp.array(np.float32((2 - abs(to)).prod(0)), seen.p)
-            fit = bell * xp.stack([self._alike(seen.p, seen.n, each, side) for each in index], 0)
-            fit = fit / fit.sum(0).clip(1e-9)
-            v, u = (xp.array(np.float32(each), seen.p) for each in to)
-            uu, uv, vv = ((fit * each).sum(0) for each in (u * u + LEVEL, u * v, v * v + LEVEL))
-            less = fit / (uu * vv - uv * uv).clip(LEVEL**2)
-            across, down = less * (vv * u - uv * v), less * (uu * v - uv * u)
-            mean = fit - (fit * u).sum(0) * across - (fit * v).sum(0) * down
-            for slope in (across, down):
-                slope[4] -= slope.sum(0)
-            self.rings[step] = xp.concat(index, 0), mean / mean.sum(0).clip(1e-9), across, down
-        index, *shares = self.rings[step]
-        return (xp.take(values, index).reshape(len(values), 9, -1) * shares[part]).sum(1)
-
-    def _between(self, p: Array, n: Array, side: Array, u: Array, v: Array) -> tuple[Array, Array]:
-        """Rows (R, K) of `Seen` from corners of cells on the same surface, and where there are any. With some
-        corners elsewhere, the others tell how values go on.
-        """
-        xp, i, j, values = self.xp, self.xp.floor(u), self.xp.floor(v), self.seen.received
-        total, most, across, down = (0 * u for _ in range(4))
-        result = 0 * xp.take(values, xp.whole(0 * u))
-        for right, below in np.ndindex(2, 2):
-            column, row = (
-                (k + step).clip(0, count - 1)
-                for k, step, count in ((i, right, self.columns), (j, below, self.rows))
-            )
-            index = xp.whole(row) * self.columns + xp.whole(column)
-            fit = self._alike(p, n, index, side)
-            weight = fit * ((1 - abs(u - column)).clip(0.0) * (1 - abs(v - row)).clip(0.0) + 0.02)
-            total, most = total + weight, xp.maximum(most, fit)
-            across, down = across + weight * (u - column), down + weight * (v - row)
-            result = result + weight * xp.take(values, index)
-        mean, rise, fall = (result / total.clip(1e-9)).reshape(3, -1, len(u))
-        return (mean + (across * rise + down * fall) / total.clip(1e-9)).clip(0.0), most > 0.5
+        """`Kernel.evened` of values (R, L)."""
+        return load_kernel().evened(self.view, self.seen.p, self.seen.n, values, step, part)
 
 
 def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples: int) -> float:

@@ -30,13 +30,8 @@ class Emitters:
         apart = np.concatenate([place[:3], TURNED * place[5:]]).round(3)[:, bright]
         group = np.unique(place[3, bright], return_inverse=True)[1]
         self.there = len(bright) > 0
-        for _ in range(ceil(log2(DISCS / (group.max() + 1))) if self.there else 0):
-            order = np.argsort(group, kind="stable")
-            first = np.flatnonzero(np.diff(group[order], prepend=-1))
-            least, most = (each.reduceat(apart[:, order], first, 1) for each in (np.minimum, np.maximum))
-            axis, every = (most - least).argmax(0)[group], np.arange(len(group))
-            beyond = apart[axis, every] > (least + most)[axis, group] / 2
-            group = np.unique(2 * group + beyond, return_inverse=True)[1]
+        if self.there:
+            group = _halved(apart, group, ceil(log2(DISCS / (group.max() + 1))))
         count = int(group.max(initial=-1)) + 1
 
         def total(values: np.ndarray) -> np.ndarray:
@@ -48,3 +43,26 @@ class Emitters:
         # (D, 10) places, normals, light and areas; siblings are neighbours
         self.discs = np.ascontiguousarray(rows.T, np.float32)
         self.p, self.n = self.discs.T[:3], self.discs.T[3:6]
+
+
+def _halved(apart: np.ndarray, group: np.ndarray, times: int) -> np.ndarray:
+    """Groups (K,) of points (R, K), each halved so often at the middle of its longest side."""
+    order = np.argsort(group, kind="stable")  # of points, group by group
+    first, at = np.flatnonzero(np.diff(group[order], prepend=-1)), np.arange(len(group))
+    apart = apart[:, order]
+    for _ in range(times):
+        size = np.diff(first, append=len(at))
+        least, most = (each.reduceat(apart, first, 1) for each in (np.minimum, np.maximum))
+        axis, own = (most - least).argmax(0), np.repeat(np.arange(len(first)), size)
+        middle = (least + most)[axis, np.arange(len(first))] / 2
+        below = apart[axis[own], at] <= middle[own]
+        count = np.add.reduceat(below, first, dtype=int)
+        before = np.cumsum(below) - below - (np.cumsum(count) - count)[own]  # those of the group
+        place = first[own] + np.where(below, before, count[own] + at - first[own] - before)
+        moved = np.empty_like(order)
+        moved[place] = at
+        order, apart = order[moved], apart[:, moved]
+        first = np.stack([first, first + count], 1)[np.stack([count, size - count], 1) > 0]
+    result = np.empty_like(order)
+    result[order] = np.repeat(np.arange(len(first)), np.diff(first, append=len(at)))
+    return result

@@ -2,8 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import astuple, dataclass
-from operator import add
+from dataclasses import dataclass
 from typing import NamedTuple
 
 from scenelang.drawing.arrays import Array
@@ -26,7 +25,7 @@ class Work:
     lost: int = 0  # rays that took all the steps there are without coming to an end
 
     def __add__(self, other: Work) -> Work:
-        return Work(*map(add, astuple(self), astuple(other)))
+        return Work(*(getattr(self, name) + getattr(other, name) for name in Work.__slots__))
 
 
 class Pieces(NamedTuple):

@@ -51,14 +51,15 @@ SHARES: Final = {1: 1 / 15, 3: 3 / 40}, {1: 1 / 21, 2: 4 / 105, 3: 9 / 280}  # o
 
 
 class Segment(NamedTuple):
-    """Ways from all nodes in one direction, each to the next node; arrays are (n…,) or (3, n…)."""
+    """Ways from all nodes in one direction, each to the next node; arrays are (n…,), or of light (n…, 4)."""
 
     share: float
     here: Floats  # parts of the sources at a node and at the next that come along
     next: Floats
     surface: Floats | None  # part of J that an opaque surface between sends back
     base: Floats  # light that joins whatever J is
-    clear: list[tuple[Floats, int]]  # what comes through to the 1st, 2nd, 4th … next node, so far on
+    clear: Floats  # what comes through from the next
+    far: int  # how far on that is in a row of all nodes
 
 
 class Mist:
@@ -199,11 +200,9 @@ class Mist:
                 base += surface * self.received
                 base[:, *to] += self.shining[:, *on] * shown
             through[to] = np.where(stop | self.opaque[to], 0.0, np.exp(-depth))
-            clear = [(through, far := int(np.dot(shift, self.strides)))]
-            while (through := _pass_on(0 * through, through, through, far)).any():
-                clear.append((through, far := 2 * far))
-            base = base.astype(np.float32)
-            self.segments.append(Segment(shares[steps], parts[0], parts[1], surface, base, clear))
+            back = None if surface is None else _rows(surface)
+            far = int(np.dot(shift, self.strides))
+            self.segments.append(Segment(shares[steps], parts[0], parts[1], back, _rows(base), through, far))
 
     def relight(self, floor: Callable[[Array], Array] | None = None) -> None:
         """Find the light at the nodes, beginning with what it was; ``floor`` tells what the ground sends
@@ -219,7 +218,7 @@ class Mist:
             if ground is not None and floor is not None and rise < 0:
                 at = p + np.reshape(shift, (3, 1)) * ((ground.y - p[1]) / shift[1])
                 sent = self.xp.to_numpy(floor(self.xp.array(at.astype(np.float32), self.field.network.codes)))
-            light[:, edge] = sent
+            light[edge, :3] = sent.T
         self._solve(base, FIRST if floor is None else ENOUGH[self.lit])
         light = np.where(self.opaque, 0.0, self.light).astype(np.float32)
         sends = self.albedo * light + self.glow
@@ -255,16 +254,10 @@ class Mist:
 
     def _sweep(self, base: list[Floats]) -> Floats:
         """What arrives at the nodes (3, n…) if that is sent on which arrived before."""
-        source, result = self.albedo * self.light, 0 * self.light
+        source, light, result = _rows(self.albedo * self.light), _rows(self.light), np.zeros_like(base[0])
         for segment, more in zip(self.segments, base, strict=True):
-            light = segment.here * source + more
-            _pass_on(light, segment.next, source, segment.clear[0][1])
-            if segment.surface is not None:
-                light += segment.surface * self.light
-            for clear, far in segment.clear:  # with each the light of twice as many nodes has joined
-                _pass_on(light, clear, light, far)
-            result += segment.share * light
-        return result
+            load_kernel().passed_on(segment, more, source, light, result)
+        return np.moveaxis(result[..., :3], -1, 0)
 
     def medium(self, p: Array) -> Array:
         """The mean radiance (3, K), linear, that arrives at points (3, K) in media from all directions, but
@@ -319,12 +312,11 @@ def pair_of(sides: Shift, shift: Shift) -> tuple[tuple[slice, ...], ...]:
     return to, tuple(slice(max(0, s), n - max(0, -s)) for n, s in ends)
 
 
-def _pass_on(light: Floats, parts: Floats, sent: Floats, far: int) -> Floats:
-    """Light (…, n…) with parts (n…) of what nodes so far on send, 0 where there are none, in place."""
-    n = parts.size
-    to, on = (slice(max(0, s), n + min(0, s)) for s in (-far, far))
-    light.reshape(-1, n)[:, to] += parts.reshape(-1)[to] * sent.reshape(-1, n)[:, on]
-    return light
+def _rows(values: Floats) -> Floats:
+    """Values (3, n…) node by node, and a 0 (n…, 4)."""
+    result = np.zeros((*values.shape[1:], 4), np.float32)
+    result[..., :3] = np.moveaxis(values, 0, -1)
+    return result
 
 
 def _received(r: np.ndarray, radius: float) -> np.ndarray:
