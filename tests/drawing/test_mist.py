@@ -150,7 +150,7 @@ def test_media_let_through_what_their_depth_says():
 
 
 def test_media_are_lit_few_pieces_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
-    """All pieces of a band at once took 1.1 GB for thirty shells at 512 x 512; in parts they look the same."""
+    """All pieces of a band at once took 1.1 GB for thirty shells at 512 x 512; parts look the same."""
     shells = "for (i in 0..<9) { torus { shell(0.02); scale(1 + i / 20); material volumetric; } }"
     drawn = nsg.compile(nsg.loads(f"canvas(64, 64); sky(); light([1, 3, 2], 9, #fff, 0.2); {shells}"))
     whole, scattering, most = draw_small(drawn).image, Lighting._scattering, 0

@@ -73,8 +73,8 @@ ALIGNED = 0.75  # cosine: normals farther apart belong to other surfaces
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
-# rays sent for each that gathers light, and from each pixel that mirrors, and where walls may hide nodes; media;
-# the share of rays of the ground that meet media; and what is not asked, for each pixel
+# rays sent for each that gathers light, and from each pixel that mirrors, and where walls may hide nodes;
+# media; the share of rays of the ground that meet media; and what is not asked, for each pixel
 PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 2.0, (1.0, 2.0), (10, 50), 1.5e7, 0.2
 EACH_PIXEL = 250
 CELLS = 8  # of the grid of nodes, along its longest side
