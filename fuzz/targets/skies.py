@@ -37,7 +37,7 @@ def check(data: bytes) -> None:
     before_s = time.process_time()
     with warnings.catch_warnings():
         warnings.simplefilter("error")
-        warnings.filterwarnings("ignore", ".* are allowed: drawn at")  # what is bounded is told
+        warnings.filterwarnings("ignore", ".*; --patient draws all of it")  # what is bounded is told
         try:
             picture = render(program, threads=1)
         except RenderError as error:

@@ -21,8 +21,14 @@ if TYPE_CHECKING:
 
 STDIN: Final = "-"
 SCENE, PROGRAM, PAGE = ".nsg", ".safetensors", ".html"
+HERE: Final = os.path.join(".", "")
 DRAWING: Final = ".svg"
 SHAPES: Final = (DRAWING, ".stl", ".glb", ".ply", ".obj")  # what holds outlines or a surface, no pixels
+WRITES: Final = {
+    PAGE: "export",
+    ".htm": "export",
+    PROGRAM: "compile",
+}  # commands, by suffixes that they alone write
 
 
 def scenes_of(paths: Iterable[str]) -> tuple[list[str], bool]:
@@ -51,7 +57,9 @@ def _walk(paths: Iterable[str], lost: list[OSError]) -> Iterator[str]:
             lost.append(error)
             continue
         shown = [entry for entry in shown if not (entry.name.startswith(".") or entry.is_symlink())]
-        inner = [e.path for e in shown if e.is_dir() or (e.name.endswith(SCENE) and e.is_file())]
+        inner = [
+            e.path.removeprefix(HERE) for e in shown if e.is_dir() or (e.name.endswith(SCENE) and e.is_file())
+        ]
         yield from _walk(inner, lost)
 
 
@@ -100,9 +108,10 @@ def targets(names: Sequence[str], out: str, suffix: str = ".png") -> list[Path]:
             _check_format(path, suffix)
         except ValueError as error:
             advice = f"{what} has a suffix such as {suffix}, a folder ends in a slash"
-            raise click.UsageError(
-                f"cannot write `{shown(out)}`: {error if path.suffix else advice}."
-            ) from None
+            if path.suffix:
+                other = "render" if suffix == PAGE else WRITES.get(path.suffix.lower())
+                advice = f"{error}" + f"; `scenelang {other}` writes other files" * bool(other)
+            raise click.UsageError(f"cannot write `{shown(out)}`: {advice}.") from None
         if not path.parent.is_dir():
             raise click.UsageError(f"cannot write `{out}`: there is no folder `{path.parent}`.")
         return [path]

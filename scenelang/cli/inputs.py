@@ -19,7 +19,7 @@ from scenelang.cli.main import describe
 from scenelang.cli.options import Request
 from scenelang.cli.say import Clock, say_diagnostics, say_trouble
 from scenelang.compiler.compile import compile_scene
-from scenelang.drawing.how import DEFAULT, Device, How
+from scenelang.drawing.how import DEFAULT, How
 from scenelang.language import tree as nodes
 from scenelang.language.diagnostics import Diagnostic, Diagnostics, SourceFile
 from scenelang.language.evaluation import Evaluation, report_unreadable
@@ -287,10 +287,8 @@ def _choose(job: Input, limits: Limits, model: str | None, here_ms: float) -> No
             break
         refused |= {o.point.name: compiled for o in result if o.point.model == point.model}
         result = [offer for offer in result if offer.point.model != point.model]
-    # as it was measured
-    device: Device = "cpu" if compiled.stage is None and point.backend == "neural" else "auto"
     samples = point.samples if point.backend == "neural" else "adaptive"
-    job.program, job.how = compiled, How(point.backend, device, job.how.threads, samples, job.how.patient)
+    job.program, job.how = compiled, How(point.backend, "auto", job.how.threads, samples, job.how.patient)
     speed = f"this machine takes {scale:.2f} times as long as the one that was measured"
     like = f"errors are promised for scenes like those of the set `{measured.set}`"
     like += ", which have no elements" if job.scene is not None and job.scene.elements else ""

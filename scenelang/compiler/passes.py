@@ -544,6 +544,7 @@ def _distance(geometry: str, chain: Sequence[Step], p: Point) -> float:
 
 _FAR: Final = 8.0
 """World units; larger coordinates and sizes were most likely meant as pixels."""
+LABELLED: Final = 4  # objects that are shown of those that nobody sees
 _TESTS: Final = 20_000
 """The most comparisons, as of boxes, beyond which nothing is reported, so that no scene takes long."""
 
@@ -564,7 +565,8 @@ def check_seen(graph: Graph, context: Context) -> Graph:
         fact = "nothing is left of the scene: the last cut takes all of it"
         _say(context, fact, cut, "let what is cut reach out of what cuts it, or what intersects meet")
     elif not seen:
-        _say(context, *_unseen(graph, rows[0].leaf))
+        labels = [Label(row.leaf.span, "and this") for row in rows[1:LABELLED] if row.leaf.span]
+        _say(context, *_unseen(graph, rows[0].leaf), labels)
     elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.plain:
         cover = cover_of(last, graph.space)
         if cover is not None and covered(graph.window(), [cover]):
@@ -573,8 +575,8 @@ def check_seen(graph: Graph, context: Context) -> Graph:
     return graph
 
 
-def _say(context: Context, fact: str, span: Span | None, help: str) -> None:
-    context.diagnostics.add("W0402", fact, span, help=help)
+def _say(context: Context, fact: str, span: Span | None, help: str, labels: Sequence[Label] = ()) -> None:
+    context.diagnostics.add("W0402", fact, span, labels=labels, help=help)
 
 
 def _left(graph: Graph) -> tuple[list[Box] | None, Span | None]:

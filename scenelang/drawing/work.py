@@ -108,7 +108,7 @@ _NS: Final = (1.8e6, 12e3, 5.0, 0.0, 100.0)
 """
 _SOLID_NS: Final = (6e6, 1e4, 600.0, 12.0, 0.0)
 """The like for solids."""
-LIGHT_MS: Final = 1.5e-4  # for an evaluation of what comes from the sky
+LIGHT_MS: Final = 2e-5  # for an evaluation of what comes from the sky
 _SHARES: Final[dict[Samples, float]] = {"four": 1.1, "one": 0.6, "draft": 0.45}
 """Shares of that for other ways to sample."""
 _REFINED: Final = 0.1, 6.0  # share of the pixels of solids that take all samples, and more along a side

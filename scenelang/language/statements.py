@@ -471,11 +471,14 @@ def _line(font: Font, text: Any, size: Any) -> tuple[list[Placed], float]:
     if values.number(size, 1) <= 0.0:
         raise Problem("E0311", f"a size of {values.show(size)} is not above 0", operand=1)
     if len(text) > MAX_TEXT:
-        raise Problem("E0370", f"a text of more than {MAX_TEXT:,} characters", operand=0)
+        help = "write it as several texts, as one is a line"
+        raise Problem("E0370", f"a text of more than {MAX_TEXT:,} characters", help, operand=0)
     try:
         return font.line(text)
     except FontError as error:
-        help = "texts are one line each; write one for each line" if "break" in str(error) else None
+        help = "`scenelang learn Font.ttf` makes a font of letters of your own"
+        if "break" in str(error):
+            help = "texts are one line each; write one for each line"
         raise Problem("E0370", str(error), help, operand=0, letter=error.at) from None
 
 

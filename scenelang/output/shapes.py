@@ -90,7 +90,7 @@ def to_mesh(
         mesh, warnings = surface_of(program, resolution, backend == "exact")
     if not len(mesh.triangles):
         help = "a mesh has what is opaque and solid"
-        diagnostics.add("E0552", "nothing is left for a mesh", None, help=help)
+        diagnostics.add("E0552", f"nothing is left for a mesh{written(program.places)}", None, help=help)
         raise SceneError(diagnostics)
     finer = f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
     for code, fact in warnings.items():

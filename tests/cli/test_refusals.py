@@ -79,7 +79,8 @@ dump a.nsg --costs --diff                          | 2 | leave out --after, --di
 dump wrong.nsg -o b.dot                            | 1 | E0201
 dump wrong.nsg --costs                             | 1 | E0201
 convert a.nsg -o a.py                              | 2 | --to nsg or json
-export a.nsg -o a.png                              | 2 | a page's file ends in .html
+export a.nsg -o a.png                              | 2 | .html; `scenelang render` writes other files
+render a.nsg -o a.html                             | 2 | suffix `.html`; `scenelang export` writes other files
 render a.nsg -o - --format foo                     | 2 | cannot write `standard output`: no image format
 render a.nsg -o a.png --format png                 | 2 | --format is for standard output
 render a.nsg a.nsg -o -                            | 2 | `standard output` names a picture

@@ -199,6 +199,16 @@ def test_the_help_for_pixels_leads_to_a_picture() -> None:
         assert picture.shape[0] - rows.mean() == pytest.approx(y, abs=3)
 
 
+def test_all_that_nobody_sees_is_shown() -> None:
+    """Only the first of two objects was."""
+    for before, both in ("", ["star", "square"]), (CAMERA, ["torus", "box"]):
+        text = before + "".join(f"{shape} {{ translate(9, 9); }}" for shape in both)
+        (only,) = nsg.check_text(text)
+        shown = [only.span.text if only.span else "", *(label.span.text for label in only.labels)]
+        assert only.code == "W0402"
+        assert [part.split()[0] for part in shown] == both
+
+
 def test_frames_with_nothing_in_sight_are_no_mistake() -> None:
     comes = "animate(seconds = 1, fps = 4); star { scale(0.3); translate(4 * u - 3, 0); }"
     far = "animate(seconds = 1, fps = 4); star { scale(30); translate(100 + 40 * u, 100); }"

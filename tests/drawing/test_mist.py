@@ -3,12 +3,18 @@
 from __future__ import annotations
 
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 import pytest
 from scipy.special import exp1
 
+import scenelang as nsg
 from scenelang.compiler.spaces import Ground, Light, Sky, Stage
+from scenelang.drawing.small import draw_small
+from scenelang.drawing.solid import draw
+from scenelang.drawing.solid.draw import Lighting
+from scenelang.drawing.solid.march import Pieces
 from scenelang.drawing.solid.mist import Mist, _aside
 from tests.drawing.solids import Object, everywhere, moved, scaled
 from tests.drawing.test_lamps import field_of
@@ -141,3 +147,22 @@ def test_media_let_through_what_their_depth_says():
     for reach, inside in ((10.0, 2.0), (3.0, 1.0), (1.5, 0.0)):
         _, clear = mist.along(p, way, np.array([reach], np.float32))
         assert clear[0] == pytest.approx(np.exp(-1.5 * inside * 0.995), rel=0.05)
+
+
+def test_media_are_lit_few_pieces_at_a_time(monkeypatch: pytest.MonkeyPatch) -> None:
+    """All pieces of a band at once took 1.1 GB for thirty shells at 512 x 512; parts look the same."""
+    shells = "for (i in 0..<9) { torus { shell(0.02); scale(1 + i / 20); material volumetric; } }"
+    drawn = nsg.compile(nsg.loads(f"canvas(64, 64); sky(); light([1, 3, 2], 9, #fff, 0.2); {shells}"))
+    whole, scattering, most = draw_small(drawn).image, Lighting._scattering, 0
+
+    def scattered(self: Lighting, way: Any, pieces: Pieces, px: float) -> Any:
+        nonlocal most
+        most = max(most, len(pieces.ray))
+        return scattering(self, way, pieces, px)
+
+    monkeypatch.setattr(Lighting, "_scattering", scattered)
+    for bound, expected in ((1 << 30, False), (100, True)):
+        most = 0
+        monkeypatch.setattr(draw, "PIECES", bound)
+        assert np.array_equal(draw_small(drawn).image, whole)
+        assert (most < 1000) == expected

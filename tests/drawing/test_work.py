@@ -33,8 +33,8 @@ def discs(count: int) -> str:
 
 
 def counted(drawn: Program, monkeypatch: pytest.MonkeyPatch) -> float:
-    """How often the network is asked while a picture is drawn, and some of that for each ray."""
-    count = 0.0
+    """How often the network is asked while a picture is drawn, and some of that for each ray and pixel."""
+    count = around.EACH_PIXEL * float(np.prod(drawn.canvas))
     field, rays, gathered = Kernel.field, Kernel.rays, Kernel.around
 
     def met(self: Kernel, *given: Any, **named: Any) -> Any:

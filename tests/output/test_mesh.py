@@ -198,6 +198,10 @@ def test_the_command_writes_a_file_or_nothing(tmp_path: Path) -> None:
     result = CliRunner().invoke(cli, [*call, str(tmp_path / "a.stl"), "--resolution", "16", "-v"])
     assert result.exit_code == 0
     assert "triangles" in result.output
+    (tmp_path / "mist.nsg").write_text("\nsphere { material volumetric; }")
+    mist = CliRunner().invoke(cli, ["render", str(tmp_path / "mist.nsg"), "-o", str(tmp_path / "c.stl")])
+    assert "error[E0552]" in mist.output
+    assert "mist.nsg:2:1)" in mist.output  # where it begins
     for out, options, said in (
         ("a.svg", [], "E0551"),
         ("b.stl", ["--size", "64x64"], "--size is of pictures"),

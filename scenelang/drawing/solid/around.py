@@ -70,9 +70,10 @@ WIDER = (2, 1.0), (4, 0.35)  # steps of the lattice, and parts of the noise by w
 ELSEWHERE = 1e6  # world units: where points are that the eye does not see
 PRODUCTS = 1 << 18  # of numbers: OpenBLAS splits larger jobs among cores, whose threads wait for each other
 # of what is foretold: rays that are asked, and what each takes beside asking the network, in times of that;
-# rays sent for each that gathers light, and where walls may hide nodes; from each pixel that mirrors; media;
-# the share of rays of the ground that meet media
-PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 2.0, (1.0, 1.5), 10, 2e6, 0.2
+# rays sent for each that gathers light, and from each pixel that mirrors, and where walls may hide nodes;
+# media; the share of rays of the ground that meet media; and what is not asked, for each pixel
+PROBES, EACH_RAY, MORE_RAYS, SHINY, MIST, ASIDE_RAYS = 64, 2.0, (1.0, 2.0), (10, 50), 1.5e7, 0.2
+EACH_PIXEL = 250
 CELLS = 8  # of the grid of nodes, along its longest side
 
 
@@ -441,7 +442,7 @@ def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples
     step = max(1, round(min(canvas) / side))
     points = (-(-canvas[0] // step) + 1) * (-(-canvas[1] // step) + 1)
     number = MORE_RAYS[walls] * (nodes * RAYS[walls] + 2 * points * rays)
-    number += SHINY * field.rough * canvas[0] * canvas[1] * (samples / 4)
+    number += SHINY[walls] * field.rough * canvas[0] * canvas[1] * (samples / 4)
     # from balls around objects to places in those of others
     u, v, r, turn = spread(np.arange(PROBES))
     own, other = np.arange(PROBES) * 7919 % count, (np.arange(PROBES) * 104729 + count // 2) % count
@@ -453,7 +454,8 @@ def light_work(field: SolidField, stage: Stage, canvas: tuple[int, int], samples
     with xp.inference():
         met = field.march(p, way, to_ground(xp, None, 0.0, way), halvings=0, gap=GAP, whole=True).work.met
     number *= 1.0 if opaque else ASIDE_RAYS * (floor > 0)
-    return number * (met / PROBES + EACH_RAY) + MIST * field.media
+    more = EACH_PIXEL * canvas[0] * canvas[1] + MIST * field.media
+    return number * (met / PROBES + EACH_RAY) + more
 
 
 def arriving(lighting: Any) -> Around:

@@ -34,6 +34,7 @@ BUSY = 8.0  # texels that a piece may cross with `FEW` panels of two points each
 FEW, MANY = 4, 12
 CHUNK = 1024  # pieces of which textures are looked up at once
 PIXELS = 4096  # on surfaces, likewise
+PIECES = 1 << 14  # of which the light is asked for at once
 GRAZING = 0.5  # how much farther or nearer a pixel's samples may be on a surface, as a part of the way
 TILE, SIDE = 1 << 16, 8  # samples at a time; pixels of tiles whose samples follow each other
 ROWS = 6  # of what a ray tells: depth, normal, object and alpha
@@ -126,38 +127,32 @@ class Lighting:
             seen = seen * 0
         trail = self.field.march(self.eye, way, limit, gap=self.pace.gap)
         surface, both, met = self._met(way, trail, limit, px)
-        beside = None if centres is None else (centres, both)
         work = trail.work + Work(rays=way.shape[1], met=len(surface))
-        result, mist, pieces = [self._reflecting(met, beside)] if met else [], None, trail.pieces
-        if len(pieces.ray):
-            for lamp in self.lamps:
-                pieces = self._cut(way, pieces, lamp)
-            mist, share = self._scattering(way, pieces, px)
-            result.append(mist)
-        if not result:
-            return Shade(seen[:3], seen[-3:], alpha, work)
-        points = Points(*(xp.concat(list(part), 1) for part in zip(*result, strict=True)))
-        light, free, more = self._lit(points, xp.take(trail.soft, surface), beside=beside)
-        work += more
-        xp.put(seen, both, light[:, : len(both)])
-        xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
-        if mist is not None:
-            lit = light[:, len(both) :], free[len(both) :]
-            glow, more = self._glow(way, pieces, share, *lit, px)
-            clear = xp.exp(-trail.depth)
-            seen, alpha, work = seen * clear + glow, 1 - (1 - alpha) * clear, work + more
+        if met:
+            beside = None if centres is None else (centres, both)
+            points = self._reflecting(met, beside)
+            light, _, more = self._lit(points, xp.take(trail.soft, surface), beside=beside)
+            work += more
+            xp.put(seen, both, light)
+            xp.put(alpha, both, xp.take(alpha, both) * 0 + 1)
+        if len(trail.pieces.ray):
+            glow, clear = 0 * seen, xp.exp(-trail.depth)
+            for pieces in _some(xp, trail.pieces):
+                work += self._glow(way, pieces, px, glow)
+            seen, alpha = seen * clear + glow, 1 - (1 - alpha) * clear
         return Shade(seen[:3], seen[-3:], alpha, work)
 
-    def _glow(
-        self, way: Array, pieces: Pieces, share: Array, light: Array, free: Array, px: float
-    ) -> tuple[Array, Work]:
-        """Light (R, M) that pieces of rays in media send towards the eye, by their shares (P,) of what is
-        seen, and what nodes on them send (R, K), as the lamps of ``free`` (K,) reach them.
+    def _glow(self, way: Array, pieces: Pieces, px: float, glow: Array) -> Work:
+        """Add the light (R, M) that pieces of rays in media send towards the eye, and tell what it took.
 
         Those whose nodes do not tell how the light goes on between them are cut and asked again.
         """
-        xp, count, work = self.xp, self.pace.nodes, Work(met=light.shape[1])
-        glow = xp.full((len(light), way.shape[1]), 0.0, way)
+        xp, count = self.xp, self.pace.nodes
+        for lamp in self.lamps:
+            pieces = self._cut(way, pieces, lamp)
+        points, share = self._scattering(way, pieces, px)
+        light, free, work = self._lit(points, way[0, :0])
+        work += Work(met=light.shape[1])
         sent, nodes = light.reshape(len(light), count, -1), free.reshape(count, -1)
         shown = sent[-3:].sum(0)
         edge = (nodes != nodes[:1]).sum(0) > 0
@@ -175,7 +170,7 @@ class Lighting:
             light, _, more = self._lit(self._scattering(way, pieces, px)[0], way[0, :0])
             work += more + Work(met=light.shape[1])
             xp.add(glow, pieces.ray, light.reshape(len(light), count, -1).sum(1))
-        return glow, work
+        return work
 
     def received(self, p: Array, n: Array) -> Array:
         """What points on surfaces (3, K) with unit normals receive from lamps (3, K) whose middles they see;
@@ -558,6 +553,14 @@ class Lighting:
         colours = met.register[:3].reshape(3, count, -1) * weight
         shares = [xp.array(base[:, None].astype(np.float32), way) for base in bases]
         return [(colours * share).sum(1) for share in shares]
+
+
+def _some(xp: Any, pieces: Pieces) -> Iterator[Pieces]:
+    """So many pieces at a time as memory allows, all those of a ray together."""
+    ray = np.asarray(xp.to_numpy(pieces.ray))
+    ends = np.searchsorted(ray, ray[PIECES::PIECES])
+    for first, last in pairwise(np.unique([0, *ends, len(ray)]).tolist()):
+        yield Pieces(*(part[first:last] for part in pieces))
 
 
 def _dot(a: Array, b: Array) -> Array:
