@@ -85,8 +85,6 @@ def surrounding(distance: Callable[[np.ndarray], np.ndarray]) -> np.ndarray:
     return np.concatenate([low, high], 1).T
 
 
-EQUAL = 1e-5  # world units: surfaces so near each other lie in one plane
-NEARLY = 1e-4  # and a point so near them is on them
 EMPTY = 100.0  # world units: the distance where nothing has been met
 RADIUS = 3.0  # leaf units: the decoder sees points in this ball, farther ones at its rim
 BLEND = 0.15  # world units: the width of the blends that the cell is trained on
@@ -250,10 +248,7 @@ class SolidNetwork(Lifted):
             kind = xp.largest(gates[1:])
             return xp.concat([new, memory[1:] + kind * (look[-1:] - memory[1:])], 0), take
         n = 1 + self.config.paint_lines
-        # on surfaces in one plane the earlier one's material shows, whichever rounding puts in front
-        plane = (abs(d - state) < EQUAL) & (abs(d) < NEARLY) & (memory[-1] < 0.5) & (look[-1] < 0.5)
-        shows = 1.0 * ~(plane & (abs(cell.bump) < NEARLY))  # but in blends, which mix
-        paint, kind = shows * xp.largest(gates[1:n]), shows * xp.largest(gates[n:])
+        paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
         gate = xp.concat([paint] * (len(memory) - 1 - switched) + [kind] * switched, 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
 

@@ -42,6 +42,8 @@ from scenelang.drawing.tables import (
 )
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
+EQUAL = 1e-5  # world units: surfaces so near each other lie in one plane
+NEARLY = 1e-4  # and a point so near them is on them
 BEHIND = 3e-5  # world units behind where a surface is foreseen that it is asked for
 ROUNDING = 2e-7  # of distances, as a part of how far and large things are: what is less deep is not met
 POINTS, PAIRS = 1 << 16, 1 << 20  # points at a time, and balls of rays at a time
@@ -369,6 +371,9 @@ class PlainField(SolidField):
             memory, look = xp.concat([memory, 0 * d[None]], 0), xp.concat([look, 0 * d[None] + 1], 0)
             switched += 1
         after, take = self.network.join(d, memory, look, cell, wanted, switched)
+        if wanted == Wanted.ALL and more != 1 and not smooth:  # in one plane the earlier one's material shows
+            plane = (abs(d - before[0]) < EQUAL) & (abs(d) < NEARLY) & (before[size - 1] + x[size - 1] < 0.5)
+            after = xp.concat([after[:1], xp.select(plane, memory[1:], after[1:])], 0)
         rows = [after[:size]]
         if wanted == Wanted.ALL:
             rows.append(xp.select(after[size:] > 0.5, x[size : size + 1], before[size : size + 1]))
