@@ -19,16 +19,21 @@ TWO = f"s.block(1.6, 1, 1) {{ {RED} }} s.block(1, 1, 1) {{ translate(0.3, 0, 0);
 SCENES = {
     "cut": CUT,
     "turned": f"group {{ {CUT} rotate(35deg, axis = [1, 2, 3]); }}",
-    "moved": "subtract { s.block(2, 1, 1) { translate(0.1, 0.1, 0.1); } s.block(1, 0.6, 1) { translate(0.1, 0.3, 0.1); } }",
+    "moved": "subtract { s.block(2, 1, 1) { translate(0.1, 0.1, 0.1); }"
+    " s.block(1, 0.6, 1) { translate(0.1, 0.3, 0.1); } }",
     "itself": "subtract { s.block(2, 1, 1); s.block(2, 1, 1); }",
     "round": "subtract { s.column(0.7, 1); s.column(0.7, 1); } sphere { scale(0.1); }",
-    "grooves": "subtract { s.block(2, 0.4, 1.4); for (i in -2..2) { s.block(0.2, 0.4, 1.4) { translate(0.4 * i, 0.2, 0); } } }",
-    "groups": f"sphere {{ scale(0.1); }} group {{ subtract {{ group {{ {TWO} }} s.block(0.6, 1, 1); }} translate(0.1, 0.1, 0); }}",
-    "intersected": f"intersect {{ s.block(2, 1, 1) {{ {RED} }} s.block(1, 1, 1) {{ translate(0.5, 0, 0); {GREEN} }} }}",
+    "grooves": "subtract { s.block(2, 0.4, 1.4);"
+    " for (i in -2..2) { s.block(0.2, 0.4, 1.4) { translate(0.4 * i, 0.2, 0); } } }",
+    "groups": "sphere { scale(0.1); }"
+    f" group {{ subtract {{ group {{ {TWO} }} s.block(0.6, 1, 1); }} translate(0.1, 0.1, 0); }}",
+    "intersected": f"intersect {{ s.block(2, 1, 1) {{ {RED} }}"
+    f" s.block(1, 1, 1) {{ translate(0.5, 0, 0); {GREEN} }} }}",
     "two": TWO,
     "turned two": f"group {{ {TWO} rotate(35deg, axis = [1, 2, 3]); }}",
     "on mist": f"s.block(1, 0.5, 1) {{ translate(0, -0.5, 0); {RED} }} s.block(1, 0.5, 1) {{ {MIST} }}",
-    "mist": f"subtract {{ s.block(2, 1, 1) {{ {MIST} }} s.block(1, 1, 1); }} s.block(2, 0.5, 1) {{ translate(0, -0.75, 0); }}",
+    "mist": f"subtract {{ s.block(2, 1, 1) {{ {MIST} }} s.block(1, 1, 1); }}"
+    " s.block(2, 0.5, 1) { translate(0, -0.75, 0); }",
 }
 
 
@@ -37,7 +42,7 @@ def scene(text: str) -> nsg.Scene:
 
 
 def wrong(found: Any, exact: Any) -> int:
-    """Pixels that differ by more than 24 of 255, as those at an edge may of which one sample of four is another."""
+    """Pixels that differ by more than 24 of 255, as at an edge those may of which a sample is another."""
     return int((abs(np.asarray(found) - np.asarray(exact)).max(2) > 24 / 255).sum())
 
 
