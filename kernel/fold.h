@@ -3,7 +3,7 @@
 #include "texture.h"
 #define EMPTY 100.0f  // world units: the distance where nothing has been met
 #define JUMP 0.03f  // of media that differ: linear colours and extinction
-#define EQUAL 1e-5f  // world units: surfaces so near each other lie in one plane
+#define EQUAL 2e-6f  // world units: surfaces so near each other lie in one plane
 #define NEARLY 1e-4f  // and a point so near them is on them
 #define NOTHING 10.0f  // how far a group with nothing in it is at most for what it is taken in by
 enum { DISTANCE, GRADIENT = 1, REGISTER_ = 2, OWNER = 4, ALL = 7, KIND = 8 };  // what is asked, known to the compiler

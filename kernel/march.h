@@ -180,6 +180,7 @@ IN Trail march(const Scene *s, const Slot *slot, int n, float gap, int steps, in
         alive &= ~done;
         // the bound fell from `free` at `past` to m.free; on that line it is 0 at: 5 % more puts the point behind
         F safe = m.free / m.rate, hope = sel(free > 0.0f, 1.05f * m.free * (t - past) / max2(free - m.free, all(1e-12f)), all(0)) + BEHIND;
+        hope = sel((m.d < 0.0f) & ~m.medium, all(8 * BEHIND), hope);  // within, though not yet deep: it may be thin
         F next = t + min2(max2(hope, safe), safe + gap);
         next = sel(within, min2(next, m.until), next);
         M over = (within & (m.until >= BIG)) | (~within & (next > m.last));

@@ -42,7 +42,7 @@ from scenelang.drawing.tables import (
 )
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
-EQUAL = 1e-5  # world units: surfaces so near each other lie in one plane
+EQUAL = 2e-6  # world units: surfaces so near each other lie in one plane
 NEARLY = 1e-4  # and a point so near them is on them
 BEHIND = 3e-5  # world units behind where a surface is foreseen that it is asked for
 ROUNDING = 2e-7  # of distances, as a part of how far and large things are: what is less deep is not met
@@ -559,6 +559,7 @@ class PlainField(SolidField):
             safe = met.free / met.rate
             hope = 1.05 * met.free * (t - past) / (free - met.free).clip(1e-12)
             hope = xp.select(free > 0, hope, 0.0) + BEHIND
+            hope = xp.select((met.d < 0) & ~medium, 8 * BEHIND, hope)  # not yet deep: it may be thin
             ahead = t + xp.minimum(xp.maximum(hope, safe), safe + gap)
             ahead = xp.select(within, xp.minimum(ahead, met.until), ahead)
             over = (within & (met.until == INF)) | (~within & (ahead > met.last))

@@ -5,7 +5,7 @@ const int KIND = 7, DRAWS = 8, CLIPS = 16, HOLDS = 32, ADDS = 64; // of a row's 
 const int ALL = 1 << 24; // behind every row
 const float NOTHING = 10.0; // world units: how far away a group is at most for what it joins
 
-const float EQUAL = 1e-5; // world units: surfaces so near each other lie in one plane
+const float EQUAL = 2e-6; // world units: surfaces so near each other lie in one plane
 const float NEARLY = 1e-4; // and a point so near them is on them
 
 // What is at a point, as far as rays ask.

@@ -257,6 +257,11 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
       }
 #endif
       float safe = far * pace, hope = before > 0.0 ? 1.05 * far * (t - past) / max(before - far, 1e-12) : 0.0;
+#ifdef MEDIA
+      if (state < 0.0 && !inside) hope = 7.0 * BEHIND; // not yet deep: it may be thin
+#else
+      if (state < 0.0) hope = 7.0 * BEHIND;
+#endif
       next = t + min(max(hope + BEHIND, safe), safe + GAP);
       past = t;
       before = far;
