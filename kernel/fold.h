@@ -3,6 +3,8 @@
 #include "texture.h"
 #define EMPTY 100.0f  // world units: the distance where nothing has been met
 #define JUMP 0.03f  // of media that differ: linear colours and extinction
+#define EQUAL 2e-6f  // world units: surfaces so near each other lie in one plane
+#define NEARLY 1e-4f  // and a point so near them is on them
 #define NOTHING 10.0f  // how far a group with nothing in it is at most for what it is taken in by
 enum { DISTANCE, GRADIENT = 1, REGISTER_ = 2, OWNER = 4, ALL = 7, KIND = 8 };  // what is asked, known to the compiler
 
@@ -51,6 +53,11 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
         F kind = max2(c->own[3] * x->d + c->past[3] * a->d + c->bias[3], c->own[4] * x->d + c->past[4] * a->d + c->bias[4]);
         M differ = wanted & KIND ? size_of(a->kind - x->kind) > 0.5f : ints(0);
         if ((wanted & KIND) && (wanted & REGISTER_)) differ |= (a->kind + x->kind > 1.0f) & (unlike(s, a->look, x->look) > JUMP);
+        M every = in;  // on surfaces in one plane the earlier one's material shows, whichever rounding puts in front
+        if ((wanted & REGISTER_) && !(wanted & KIND) && !c->smooth) {
+            M opaque = (a->look[s->rows - 1] < 0.5f) & (x->look[s->rows - 1] < 0.5f);
+            in &= ~(opaque & (size_of(a->d - x->d) < EQUAL) & (size_of(x->d) < NEARLY));
+        }
         if (wanted & REGISTER_) {
             F paint = max2(c->own[1] * x->d + c->past[1] * a->d + c->bias[1], c->own[2] * x->d + c->past[2] * a->d + c->bias[2]);
             F gates[2] = {sel(in, clamp(paint, 0, 1), all(0)), sel(in, clamp(kind, 0, 1), all(0))};
@@ -66,6 +73,7 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
             a->kind += sel(in, clamp(kind, 0, 1), all(0)) * (x->kind - a->kind);
         }
         if (wanted & OWNER) a->owner = (x->owner & held) | (a->owner & ~held);
+        in = every;
     }
     a->d = sel(in, after, a->d);
 }

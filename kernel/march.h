@@ -4,7 +4,8 @@
 // differ, steps in them are bounded by each other's surfaces, too, and ways are cut where they do.
 #pragma once
 #include "points.h"
-#define TOUCH 1e-5f  // world units: so near counts as met
+#define BEHIND 3e-5f  // world units behind where a surface is foreseen that it is asked for
+#define ROUNDING 2e-7f  // of distances, as a part of how far and how large things are: what is less deep is not met
 #define DRIFT 0.2f  // of media that differ along a piece little by little, as `JUMP`
 #define BETWEEN 8  // halvings of a step from one medium to another
 
@@ -120,16 +121,21 @@ IN Trail march(const Scene *s, const Slot *slot, int n, float gap, int steps, in
     M within = ints(0);
     int parted = (wanted & KIND) && (s->dense || s->coloured), density = s->rows - s->switched;
     for (int k = 0; k < REGISTER; k++) look[k] = first[k] = all(0);
-    for (int k = 0; k < n; k++) if (slot[k].object->flags & STOPS) t = min2(slot[k].begin, t);
+    float large = 0;
+    for (int k = 0; k < n; k++) {
+        if (slot[k].object->flags & STOPS) t = min2(slot[k].begin, t);
+        large = fmaxf(slot[k].object->extent, large);
+    }
     M alive = t < BIG;
     past = t;
+    t += sel(alive, all(BEHIND), all(0));
     for (; steps > 0 && any(alive); steps--) {
         Met m;
         int whole = parted && any(within & alive);
         if (!whole) m = meet(s, slot, n, t, alive, pairs, wanted);
         if (whole || (parted && any(m.medium & alive))) m = looked(s, slot, n, t, alive, pairs);
         r.asked += __builtin_popcount(bits(alive));
-        M medium = m.medium & alive, done = alive & (s->media ? (m.d < 0.0f) & ~medium : m.d < TOUCH);
+        M medium = m.medium & alive, done = alive & ~medium & (m.d < -ROUNDING * (t + large));
         F at = max2(past + (t - past) * (free / max2(free + m.free, all(1e-9f))), t - gap);
         M struck = done & ~within;
         r.hit = sel(struck, at, r.hit);
@@ -173,7 +179,8 @@ IN Trail march(const Scene *s, const Slot *slot, int n, float gap, int steps, in
         }
         alive &= ~done;
         // the bound fell from `free` at `past` to m.free; on that line it is 0 at: 5 % more puts the point behind
-        F safe = m.free / m.rate, hope = 1.05f * m.free * (t - past) / max2(free - m.free, all(1e-12f)) + TOUCH;
+        F safe = m.free / m.rate, hope = sel(free > 0.0f, 1.05f * m.free * (t - past) / max2(free - m.free, all(1e-12f)), all(0)) + BEHIND;
+        hope = sel((m.d < 0.0f) & ~m.medium, all(8 * BEHIND), hope);  // within, though not yet deep: it may be thin
         F next = t + min2(max2(hope, safe), safe + gap);
         next = sel(within, min2(next, m.until), next);
         M over = (within & (m.until >= BIG)) | (~within & (next > m.last));
@@ -183,7 +190,7 @@ IN Trail march(const Scene *s, const Slot *slot, int n, float gap, int steps, in
         alive &= ~ended;
         past = sel(jumps, following, t);
         free = sel(jumps, all(0), m.free);
-        t = sel(alive, following, t);
+        t = sel(alive, following + sel(jumps, all(BEHIND), all(0)), t);
     }
     r.lost = alive;
     if (s->media && any(alive & within)) close_pieces(s, pieces, ray, alive & within, since, t, look[density], &r);

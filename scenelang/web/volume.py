@@ -15,6 +15,7 @@ import numpy as np
 
 from scenelang.compiler.program import Program
 from scenelang.compiler.spaces import Sky
+from scenelang.drawing.size import sized
 from scenelang.drawing.solid.around import GOLDEN, TURNS, Around, arriving, disc
 from scenelang.drawing.solid.draw import Lighting
 from scenelang.drawing.solid.field import SolidField
@@ -52,7 +53,9 @@ Counts = Callable[[Floats], list[Any]]  # of directions (3, …): by what light 
 def volume(
     program: Program, network: SolidArrays, store: ArrayStore, detail: Detail = FULL
 ) -> dict[str, Any]:
-    """The part ``around`` of a view, of a Program whose stage has a sky."""
+    """The part ``around`` of a view, of a Program whose stage has a sky, in the Program's own unit."""
+    assert program.stage is not None
+    by, program = program.stage.growth, sized(program)
     brought, paints, stage = program.brought(), program.paints(), program.stage
     assert stage is not None
     ground = stage.ground
@@ -73,7 +76,7 @@ def volume(
         if field.media:
             means = np.concatenate([means, means if around.mist is None else around.medium(p)])
         ratios = (light[3:] / np.tile(light[:3], (8, 1)).clip(1e-9)).clip(-1.0, 1.0)
-        data = {"low": (middle - half).tolist(), "side": h, "sides": sides, "floor": None}
+        data = {"low": ((middle - half) / by).tolist(), "side": h / by, "sides": sides, "floor": None}
         data |= {"free": store.add(free.astype(np.uint8)), **_roots(means, store)}
         data["ratios"] = store.add(np.rint(128 + 127 * ratios).astype(np.uint8))
         if ground is not None:
@@ -81,7 +84,7 @@ def volume(
             x = scale * np.sinh(SPREAD * np.linspace(-1.0, 1.0, detail.floor))
             axes = [middle[0] + x, np.array([ground.y + OFF]), middle[2] + x]
             light = _light(around, axes, lambda way: [4 * way[1].clip(0.0)], detail)[1]
-            plane = [*middle[[0, 2]].tolist(), scale, SPREAD]
+            plane = [*(middle[[0, 2]] / by).tolist(), scale / by, SPREAD]
             data["floor"] = {"plane": plane, "side": detail.floor, **_roots(light, store)}
     return data
 

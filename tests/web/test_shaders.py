@@ -31,8 +31,10 @@ from scenelang.web.plane import leaves
 from scenelang.web.volume import DRAFT, OPEN, Detail, volume
 from tests.assets.shapes import ball, element, noise, square, torus
 from tests.browser import watched
+from tests.drawing import test_flush as flush
 from tests.drawing.test_bounds import of_sets, rng_of, wild
 from tests.drawing.test_opacity import see_through
+from tests.drawing.test_size import SCENE
 from tests.drawing.test_trees import LEFT, scene_of
 from tests.pictures import premultiplied, psnr_db
 from tests.test_examples import SCENES, sized
@@ -531,3 +533,28 @@ def check_points(page: Any, program: Program, inside: int = 250, near: float = n
     assert (found[~seen & ~border, 0] > near - 1e-3).all()
     # a colour gives way to another within 0.001 of distance, and so follows its last bits
     assert (abs(found - known)[seen].max(1) > 1e-4).mean() < 1e-3
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("name", ["cut", "itself", "two", "on mist"])
+def test_faces_in_one_plane_are_as_the_formulas_say(page: Any, name: str) -> None:
+    text = flush.scene(flush.SCENES[name])
+    assert flush.wrong(pictured(page, nsg.compile(text))[..., :3], nsg.render(text, backend="reference")) < 8
+
+
+# ---------------------------------------------------------------- every size
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("sky", ["", "sky();"])
+def test_pages_do_not_depend_on_the_unit(page: Any, sky: str) -> None:
+    """A blend, a cut, mist, a turn behind the scale, a ground that fades, a soft lamp."""
+
+    def shown(k: float) -> np.ndarray:
+        text = f"nsg 1; let k = {k!r}; {sky} {SCENE}"
+        return pictured(page, nsg.compile(nsg.loads(text)), draft=DRAFT if sky else None)
+
+    usual = shown(1.0)
+    assert usual.std() > 0.1
+    for k in (1e-3, 0.05, 1e3):
+        assert psnr_db(shown(k), usual) > 45

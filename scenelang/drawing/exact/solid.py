@@ -226,6 +226,10 @@ _MARGIN = 2e-2
 """Balls are this much larger than what they hold, in world units: more than the least step of a ray."""
 
 
+_INSIDE = 1e-7  # how far behind a surface its colour is asked for
+_EQUAL = 1e-10  # of distances: what is left of rounding
+
+
 class ExactState(Record):
     """State of a fold, and optional values."""
 
@@ -258,6 +262,9 @@ def join(op: str, k: float, a: ExactState, b: ExactState) -> ExactState:
     if paint is None:
         return ExactState(d, a.medium, near, a.rgb, slope, a.owner, a.glow)
     medium = np.where(paint > 0.5, b.medium, a.medium)
+    if op == "union":  # on surfaces in one plane the earlier one's shows, as where d is 0
+        plane = (abs(a.d - b.d) < _EQUAL) & (abs(b.d) < 2 * _INSIDE) & (a.medium == 0) & (b.medium == 0)
+        paint = paint & ~plane
     rgb = None if a.rgb is None or b.rgb is None else a.rgb + (b.rgb - a.rgb) * paint
     owner = None if a.owner is None or b.owner is None else np.where(paint > 0.5, b.owner, a.owner)
     glow = None if a.glow is None or b.glow is None else a.glow + (b.glow - a.glow) * paint
@@ -436,7 +443,6 @@ HALVINGS = 9
 SPOTS = 64  # places on a lamp of a radius that a sample of a surface is lit from
 SPOTS_IN_MEDIA = 16
 
-_INSIDE = 1e-7  # how far behind a surface its colour is asked for
 _NODES, _WEIGHTS = np.polynomial.legendre.leggauss(4) + np.array([[1.0], [0.0]])
 _GOLDEN = (5.0**0.5 - 1.0) / 2.0
 

@@ -42,7 +42,10 @@ from scenelang.drawing.tables import (
 )
 
 NOTHING = 10.0  # world units: how far a group with nothing in it is at most for what it is taken in by
-TOUCH = 1e-5  # world units: so near counts as met
+EQUAL = 2e-6  # world units: surfaces so near each other lie in one plane
+NEARLY = 1e-4  # and a point so near them is on them
+BEHIND = 3e-5  # world units behind where a surface is foreseen that it is asked for
+ROUNDING = 2e-7  # of distances, as a part of how far and large things are: what is less deep is not met
 POINTS, PAIRS = 1 << 16, 1 << 20  # points at a time, and balls of rays at a time
 FULL = 0.7  # of rays that are asked at least so many are under way
 # of media that differ, linear colours and extinction: abruptly, or along a piece; halvings of the way between
@@ -368,6 +371,9 @@ class PlainField(SolidField):
             memory, look = xp.concat([memory, 0 * d[None]], 0), xp.concat([look, 0 * d[None] + 1], 0)
             switched += 1
         after, take = self.network.join(d, memory, look, cell, wanted, switched)
+        if wanted == Wanted.ALL and more != 1 and not smooth:  # in one plane the earlier one's material shows
+            plane = (abs(d - before[0]) < EQUAL) & (abs(d) < NEARLY) & (before[size - 1] + x[size - 1] < 0.5)
+            after = xp.concat([after[:1], xp.select(plane, memory[1:], after[1:])], 0)
         rows = [after[:size]]
         if wanted == Wanted.ALL:
             rows.append(xp.select(after[size:] > 0.5, x[size : size + 1], before[size : size + 1]))
@@ -483,7 +489,8 @@ class PlainField(SolidField):
         """
         xp, pieces = self.xp, list[tuple[Array, ...]]()
         wanted = Wanted.ALL if self._marks else Wanted(bool(self.mixed))
-        t = past = ways.first(xp)
+        past, large = ways.first(xp), max(float(solid.row["extent"]) for solid in self._solids)
+        t = past + BEHIND
         hit, length, soft, free, since, seen = 0 * t + INF, 0 * t, 0 * t, 0 * t, 0 * t, 0 * t
         work, ids, within = Work(near=len(t)), xp.where(t == t), t != t
         look = first = 0 * t + 0 * self.looks[:, :1]  # of the medium where it was asked for last, or begins
@@ -526,7 +533,7 @@ class PlainField(SolidField):
             met, alive = self._asked(ways, t, wanted), t < INF
             work += Work(steps=len(some), met=met.pairs)
             medium = met.medium & alive
-            done = alive & ((met.d < 0) & ~medium if self.media else met.d < TOUCH)
+            done = alive & ~medium & (met.d < -ROUNDING * (t + large))
             at = xp.maximum(past + (t - past) * (free / (free + met.free).clip(1e-9)), t - gap)
             struck, into = xp.where(done & ~within), done & within
             xp.put(hit, xp.take(ids, struck), xp.take(at, struck))
@@ -550,7 +557,9 @@ class PlainField(SolidField):
             alive = alive & ~done
             # bounds fell from `free` to met.free; on that line they are 0 soon, and 5 % more is behind that
             safe = met.free / met.rate
-            hope = 1.05 * met.free * (t - past) / (free - met.free).clip(1e-12) + TOUCH
+            hope = 1.05 * met.free * (t - past) / (free - met.free).clip(1e-12)
+            hope = xp.select(free > 0, hope, 0.0) + BEHIND
+            hope = xp.select((met.d < 0) & ~medium, 8 * BEHIND, hope)  # not yet deep: it may be thin
             ahead = t + xp.minimum(xp.maximum(hope, safe), safe + gap)
             ahead = xp.select(within, xp.minimum(ahead, met.until), ahead)
             over = (within & (met.until == INF)) | (~within & (ahead > met.last))
@@ -558,7 +567,7 @@ class PlainField(SolidField):
             close(alive & within & (following == INF), t)
             jumps = over | (following > ahead)
             past, free = xp.select(jumps, following, t), xp.select(jumps, 0.0, met.free)
-            t = xp.select(alive, following, INF)
+            t = xp.select(alive, following + xp.select(jumps, BEHIND, 0.0), INF)
         work.lost = int((t < INF).sum())
         close(within & (t < INF), t)
         return hit, length, soft, pieces, work

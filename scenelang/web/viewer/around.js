@@ -16,9 +16,9 @@ function halves(gl, target, sizes, data) {
   return texture;
 }
 
-/** Textures and uniforms of the part `around` of a view, none where it has none. */
+/** Textures of the part `around` of a view, none where it has none, and its uniforms where lengths grow by a number. */
 export function aroundOf(gl, part) {
-  if (!part) return { textures: {}, uniforms: {} };
+  if (!part) return { textures: {}, uniforms: () => ({}) };
   const { low, side, sides: [x, y, z], top, light, ratios, free, floor } = part, count = x * y * z;
   const blocks = MOMENTS + (light.length > 3 * count), high = Math.ceil(blocks / 3) * y, wide = 3 * z;
   const data = new Float32Array(4 * wide * high * x).fill(1);
@@ -34,14 +34,16 @@ export function aroundOf(gl, part) {
     }
   }
   const textures = { around: halves(gl, gl.TEXTURE_3D, [wide, high, x], data) };
-  const uniforms = { lattice: [...low, side], nodes_: [x, y, z] };
+  const uniforms = (by) => ({
+    lattice: [...low, side].map((v) => v * by), nodes_: [x, y, z],
+    ...(floor && { plane: [...floor.plane.slice(0, 3).map((v) => v * by), floor.plane[3]] }),
+  });
   if (floor) {
     const side = floor.side, received = new Float32Array(4 * side * side);
     for (let i = 0; i < floor.light.length; i++) {
       received[4 * (i % (side * side)) + Math.floor(i / (side * side))] = lightOf(floor.light[i], floor.top);
     }
     textures.floor_ = halves(gl, gl.TEXTURE_2D, [side, side], received);
-    uniforms.plane = floor.plane;
   }
   return { textures, uniforms };
 }

@@ -1,9 +1,9 @@
-import { axesOf } from "./stage.js";
+import { axesOf, growthOf } from "./stage.js";
 
 // The camera of a 3D scene, moved by hand. Lengths are in world units, angles in radians, y is up.
 
 const NEAREST_POLE = 0.02; // an orbit stays this far from straight above and below the target
-const NEAREST_EYE = 0.05;
+const NEAREST_EYE = 0.05; // of a view of the usual size, as the next
 const FARTHEST_EYE = 1e4;
 
 const vecMinus = (a, b) => [a[0] - b[0], a[1] - b[1], a[2] - b[2]];
@@ -22,11 +22,11 @@ export function orbited(camera, turn, rise) {
   return { ...camera, eye: vecPlus(camera.target, way) };
 }
 
-/** A camera whose distance from its target is `factor` times as long. */
-export function zoomed(camera, factor) {
+/** A camera whose distance from its target is `factor` times as long; `by` is as of `growthOf`. */
+export function zoomed(camera, factor, by = 1) {
   const from = vecMinus(camera.eye, camera.target);
   const distance = Math.hypot(...from);
-  const wanted = Math.max(NEAREST_EYE, Math.min(FARTHEST_EYE, distance * factor));
+  const wanted = Math.max(NEAREST_EYE / by, Math.min(FARTHEST_EYE / by, distance * factor));
   return { ...camera, eye: vecPlus(camera.target, from, wanted / distance) };
 }
 
@@ -39,14 +39,16 @@ export function panned(camera, right, up) {
   return { ...camera, eye: vecPlus(camera.eye, way), target: vecPlus(camera.target, way) };
 }
 
-/** A stage as another camera sees it. */
+/** A stage as another camera sees it, drawn in the unit that its own asks for. */
 export function seenBy(stage, { eye, target, fov }) {
-  return { ...stage, camera: { eye, target, fov_rad: fov } };
+  return { ...stage, growth: growthOf(stage), camera: { eye, target, fov_rad: fov } };
 }
 
-/** The line of a scene that says where a camera is; its numbers are rounded to 1e-4, fov to 1e-3 degrees. */
+/** The line of a scene that says where a camera is; its numbers are rounded to 1e-4 and finer
+ * from nearby, fov to 1e-3 degrees. */
 export function cameraText(camera) {
-  const point = (p) => `[${p.map((v) => plainNumber(v, 4)).join(", ")}]`;
+  const digits = 4 - Math.floor(Math.log10(Math.hypot(...vecMinus(camera.eye, camera.target))));
+  const point = (p) => `[${p.map((v) => plainNumber(v, Math.max(4, Math.min(20, digits)))).join(", ")}]`;
   const fov = plainNumber((camera.fov * 180) / Math.PI, 3);
   return `camera(eye = ${point(camera.eye)}, target = ${point(camera.target)}, fov = ${fov}deg);`;
 }

@@ -5,6 +5,9 @@ const int KIND = 7, DRAWS = 8, CLIPS = 16, HOLDS = 32, ADDS = 64; // of a row's 
 const int ALL = 1 << 24; // behind every row
 const float NOTHING = 10.0; // world units: how far away a group is at most for what it joins
 
+const float EQUAL = 2e-6; // world units: surfaces so near each other lie in one plane
+const float NEARLY = 1e-4; // and a point so near them is on them
+
 // What is at a point, as far as rays ask.
 float state; // distance
 float dense; // whether it is a medium; where there are several densities, 1 more than that
@@ -59,6 +62,8 @@ void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3
   float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
   slope = (take * made.x + rate * line.x) * g + (keep + rate * line.y) * slope;
   float gate = painting(at, own, past);
+  // on surfaces in one plane the earlier one's material shows, whichever rounding puts in front
+  if (kind_ != SMOOTH && abs(d - before) < EQUAL && abs(d) < NEARLY && dense + medium < OTHER) gate = 0.0;
   dense += kind(at, own, past) * (medium - dense);
 #ifdef TEXTURES
   even += gate * (plain - even);

@@ -1,7 +1,8 @@
 
 // Rays: the balls that one passes, and the way along it.
 
-const float TOUCH = 1e-5; // world units: so near counts as met
+const float BEHIND = 3e-5; // world units behind where a surface is foreseen that it is asked for
+const float ROUNDING = 2e-7; // of distances, as a part of how far and large things are: what is less deep is not met
 const float GAP = 0.009; // by which steps may go beyond what is certain
 const int STEPS = 800; // of a ray
 const int WINDOWS = 16; // of a ray that passes more balls than it keeps
@@ -12,6 +13,7 @@ vec3 rayFrom, rayWay;
 // in a group; the rate is less than 0 where what was before ends outside of the ball.
 vec4 slots[SLOTS];
 int slotCount;
+float large; // half of how wide the largest of them is
 
 // Let a point of the ray meet the objects in whose balls it is.
 void meet(float t) {
@@ -71,6 +73,7 @@ float needed(vec4 slot) {
 float gather(ivec2 list, float low, float high) {
   float sure = high;
   slotCount = 0;
+  large = 0.0;
   for (int i = zero; i < list.y; i++) {
     int row = listed(list.x + i);
     vec4 around = part(row, AROUND);
@@ -120,6 +123,7 @@ float gather(ivec2 list, float low, float high) {
       for (int j = far; j < SLOTS - 1; j++) slots[j] = slots[j + 1];
       slotCount--;
     }
+    large = max(large, sqrt(around.w));
     slots[slotCount++] = vec4(name, begin, end, rate);
   }
   return sure;
@@ -188,7 +192,7 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
           past = to * (1.0 - 1e-6);
           before = 0.0;
         }
-        next = to;
+        next = to > next ? to + BEHIND : to;
         until = sure;
         float rate = 1e-3;
         for (int i = zero; i < slotCount; i++) {
@@ -204,6 +208,7 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
       t = next;
       meet(t);
       float far = abs(state), root;
+      bool deep = state < -ROUNDING * (t + large);
 #ifdef MEDIA
 #ifdef MIXED
       bool is = dense > 0.5;
@@ -211,7 +216,7 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
 #else
       const bool is = true;
 #endif
-      bool inside = state < 0.0 && is, done = state < 0.0 && !is;
+      bool inside = state < 0.0 && is, done = deep && !is;
       root = max(past + (t - past) * (before / max(before + far, 1e-9)), t - GAP);
       if (done) {
         if (within) { // where a medium ends the distance need not be 0
@@ -246,13 +251,18 @@ void march(ivec2 list, vec3 from, vec3 way, float limit) {
       if (!inside && within) close(since, root);
       within = inside;
 #else
-      if (state < TOUCH) {
+      if (deep) {
         hit = max(past + (t - past) * (before / max(before + far, 1e-9)), t - GAP);
         return;
       }
 #endif
-      float safe = far * pace, hope = 1.05 * far * (t - past) / max(before - far, 1e-12) + TOUCH;
-      next = t + min(max(hope, safe), safe + GAP);
+      float safe = far * pace, hope = before > 0.0 ? 1.05 * far * (t - past) / max(before - far, 1e-12) : 0.0;
+#ifdef MEDIA
+      if (state < 0.0 && !inside) hope = 7.0 * BEHIND; // not yet deep: it may be thin
+#else
+      if (state < 0.0) hope = 7.0 * BEHIND;
+#endif
+      next = t + min(max(hope + BEHIND, safe), safe + GAP);
       past = t;
       before = far;
     }

@@ -4,7 +4,7 @@ import { checkedProgram, floats, linking, triangle, unfiltered } from "./gl.js";
 import { solidElements } from "./elements.js";
 import { cellsOf, cubeOf, listsOf, solidBalls } from "./balls.js";
 import { groupsOf, joinsOf } from "./groups.js";
-import { axesOf, FADE } from "./stage.js";
+import { axesOf, FADE, growthOf, scaledStage } from "./stage.js";
 import { aroundOf } from "./around.js";
 
 const ROW_TEXELS = 15; // as the shader has it
@@ -12,6 +12,7 @@ const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around a lamp
 const BAND = 1 << 14; // pixels drawn at a time
+const UNMOVED = [1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0];
 const MOST_SLOTS = 256; // balls that a ray keeps
 const COLOUR_STEPS = { color: 0, grayscale: 1, hue: 2 };
 
@@ -20,6 +21,18 @@ const isMedium = (view, row) => view.materials[row.material].medium > 0.5;
 
 /** Extinction of a row's medium per world unit. */
 const densityOf = (view, row) => row.density ?? view.network.extinction;
+
+/** Rows and stage of the same picture whose view is as large as the usual one, and by how much lengths grew. */
+function sized(view, { rows, stage }) {
+  const by = growthOf(stage);
+  if (by === 1) return { rows, stage, by };
+  const grown = rows.map((row) => {
+    const [[kind, ...map], ...steps] = row.steps[0]?.[0] === "map" ? row.steps : [["map", ...UNMOVED], ...row.steps];
+    const frame = map.map((v, i) => (i % 4 < 3 ? v / by : v)), density = densityOf(view, row) / by;
+    return { ...row, steps: [[kind, ...frame], ...steps], scale: row.scale * by, blend: row.blend * by, density };
+  });
+  return { rows: grown, stage: scaledStage(stage, by), by };
+}
 
 /** The lamps of a stage, and dark ones up to a number. */
 function lampsOf({ light, lights = [light] }, least = 1) {
@@ -195,7 +208,7 @@ export function solidDrawer(gl, view) {
   /** Take rows in, and cells for a picture of a size. */
   const prepare = (program, width, height) => {
     if (ready.program === program && ready.width === width && ready.height === height) return;
-    const { rows, stage } = program, joins = joinsOf(rows), balls = solidBalls(rows, joins, network, boxOf);
+    const { rows, stage, by } = sized(view, program), joins = joinsOf(rows), balls = solidBalls(rows, joins, network, boxOf);
     const pixel = 2 / Math.min(width, height), near = 1 / Math.tan(stage.camera.fov_rad / 2);
     const tiles = [width, height].map((side) => Math.ceil(side / TILE_SIDE));
     const scale = near / pixel / TILE_SIDE;
@@ -213,7 +226,7 @@ export function solidDrawer(gl, view) {
     depth = Math.max(depth, groupsOf(joins).depth);
     while (slots < Math.min(MOST_SLOTS, longest)) slots *= 2;
     ready = {
-      program, width, height, pixel, near, axes, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],
+      program, stage, by, width, height, pixel, near, axes, cells: [TILE_SIDE, tiles[0], 1 + seen.count, CUBE_SIDE],
     };
   };
 
@@ -234,11 +247,11 @@ export function solidDrawer(gl, view) {
       canvas: [ready.width, ready.height, ready.pixel],
     };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
-    const { light: _, ground, ...stage } = ready.program.stage;
-    setUniforms(gl, at, "stage", { ...stage, ground: ground && { fade: FADE, ...ground }, lights: lampsOf(ready.program.stage, lamps) });
+    const { light: _, ground, ...stage } = ready.stage;
+    setUniforms(gl, at, "stage", { ...stage, ground: ground && { fade: FADE, ...ground }, lights: lampsOf(ready.stage, lamps) });
     gl.uniform4iv(at("grid"), ready.cells);
     gl.uniform4fv(at("cells"), network.cells);
-    for (const [name, value] of Object.entries(around.uniforms)) gl[`uniform${value.length}fv`](at(name), value);
+    for (const [name, value] of Object.entries(around.uniforms(ready.by))) gl[`uniform${value.length}fv`](at(name), value);
   };
 
   /** Draw a picture in bands, so that no call takes long; stops after each. */
@@ -293,7 +306,7 @@ export function solidDrawer(gl, view) {
       if (!gl.getExtension("EXT_color_buffer_float")) throw new Error("no framebuffers of floats here");
       prepare(program, 16, 16);
       const four = new Float32Array(4 * count);
-      for (let i = 0; i < count; i++) four.set(p.subarray(3 * i, 3 * i + 3), 4 * i);
+      for (let i = 0; i < count; i++) four.set(p.subarray(3 * i, 3 * i + 3).map((v) => v * ready.by), 4 * i);
       const places = floats(gl, four, width), screen = screens(gl, width, height, [gl.RGBA32F, gl.RGBA32F]);
       use(["POINTS"], { places });
       gl.viewport(0, 0, width, height);
@@ -306,6 +319,7 @@ export function solidDrawer(gl, view) {
           found.set(numbers.subarray(4 * at, 4 * at + parts), 5 * at + 4 * i);
         }
       });
+      for (let at = 0; at < count; at++) found[5 * at] /= ready.by;
       dropScreens(gl, screen);
       gl.deleteTexture(places);
       gl.bindFramebuffer(gl.FRAMEBUFFER, into);

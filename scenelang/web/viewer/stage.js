@@ -43,6 +43,25 @@ export function stageFrom({ background, ...given }, lamps, { dimension, stage: k
   return { stage, background: behind };
 }
 
+/** By how much lengths grow where a stage's view becomes as large as the usual one, as `scenelang/drawing/size.py`. */
+export function growthOf({ growth, camera: { eye, target, fov_rad: view } }) {
+  if (growth) return growth;
+  const usual = Math.hypot(1.2, 6) / 3, by = usual / (Math.hypot(...eye.map((v, i) => v - target[i])) * Math.tan(view / 2));
+  return Math.abs(by - 1) > 1e-6 && Number.isFinite(by) ? by : 1;
+}
+
+/** The same picture of a stage with all lengths times a number. */
+export function scaledStage({ camera, ground, light, lights, ...stage }, by) {
+  const moved = (point) => point.map((v) => v * by);
+  const lamp = ({ position, power, radius, ...rest }) => (
+    { ...rest, position: moved(position), power: power * by * by, ...(radius && { radius: radius * by }) });
+  return {
+    ...stage, camera: { ...camera, eye: moved(camera.eye), target: moved(camera.target) },
+    ground: ground && { ...ground, y: ground.y * by, fade: (ground.fade ?? FADE) * by },
+    ...(light && { light: lamp(light) }), ...(lights && { lights: lights.map(lamp) }),
+  };
+}
+
 /** The lamps; `light(none)` stands alone. */
 function lightsFrom(lamps, known) {
   const dark = lamps.some(([first]) => first === null);

@@ -4,6 +4,7 @@ import { Pace } from "./pace.js";
 import { planeDrawer } from "./plane.js";
 import { solidDrawer } from "./solid.js";
 import { alike, defaultsOf, WITH_ARRAYS } from "./store.js";
+import { growthOf } from "./stage.js";
 import { Surface } from "./surface.js";
 
 const DRAWN_FROM = ["dimension", ...WITH_ARRAYS]; // what a drawer is made of
@@ -174,7 +175,7 @@ export class Viewer {
 
   /** Make the distance from the target `factor` times as long. */
   zoom(factor) {
-    if (this.camera) this.camera = zoomed(this.camera, factor);
+    if (this.camera) this.camera = zoomed(this.camera, factor, growthOf(this.program.stage));
   }
 
   /** Move what is seen to the right and upward, in shares of the shorter side. */
