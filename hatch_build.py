@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import importlib.util
+import os
 import shutil
 import sys
 import sysconfig
@@ -32,14 +33,16 @@ class Made(BuildHookInterface):  # type: ignore[misc, type-arg]
         self.folder = tempfile.mkdtemp()
         place = Path(self.folder, "tables.json")
         make(grammar, place, source_mark(grammar))
-        library = Path(self.folder, kernel.name())
-        kernel.build(library)
+        target = os.environ.get("KERNEL_TARGET")  # another machine, of those of kernel/build.py
+        library = Path(self.folder, kernel.name(target))
+        kernel.build(library, target)
         build_data["force_include"] |= {
             str(place): "scenelang/language/tables.json",
             str(library): f"scenelang/drawing/{library.name}",
         }
         build_data["pure_python"] = False
-        machine = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        here = sysconfig.get_platform().replace("-", "_").replace(".", "_")
+        machine = kernel.TARGETS[target][1] if target else here
         build_data["tag"] = f"py3-none-{machine}"  # it asks nothing of Python
 
     def _kernel(self) -> Any:

@@ -149,13 +149,12 @@ def light_up(
     rows, count = int(rng.choice([3, 6])), 20
     seen = (rng.normal(size=(count, 6 + 3 * rows)) * wild).astype(np.float32)
     kernel.between(p, way, view, seen)
-    kernel.evened(
-        view, *seen.T[:6].reshape(2, 3, -1), seen.T[6:], int(rng.integers(1, 5)), int(rng.integers(0, 3))
-    )
+    step, part = int(rng.integers(1, 5)), int(rng.integers(0, 3))
+    kernel.evened(view, seen.T[:3], seen.T[3:6], seen.T[6:], step, part)
     here, light = (rng.random((count, size)).astype(np.float32) for size in (1, 4))
     far = int(rng.choice([-30, -7, -1, 1, 5, 19]))
     segment = Segment(0.1, here, here, light if rng.random() < 0.5 else None, light, here, far)
-    kernel.passed_on(segment, light, light * wild, light, 0 * light)
+    kernel.passed_on(segment, light, light * np.float32(wild), light, 0 * light)
     objects = np.sort(rng.integers(0, int(tables.scene["objects"]), p.shape[1]))
     kernel.crossings(tables, objects, p, way, abs(p[1]), np.full(p.shape[1], 0.1))
 

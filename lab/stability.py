@@ -133,7 +133,7 @@ def unfolded(scene: Scene, program: Program, model: Model) -> Program:
 def picture_of(model: Model, program: Program, **options: Any) -> Image:
     """A Program's picture; options are those of `renderers.draw.draw`, of solids those of `draw_program`."""
     if not isinstance(model.network, Framed):
-        return draw_program(program, model, **{"threads": 1, **options}).image
+        return draw_program(program, model, **{"threads": 1, "patient": True, **options}).image
     return draw(model.network, program, **options).image
 
 

@@ -141,7 +141,9 @@ def _neural(name: str, side: int, threads: int, samples: Sampling = "adaptive", 
         program = compile_scene(scene, model=name)
         if choose_drawer(program)[0] == "torch":
             model = open_model(name)
-            return lambda: draw_program(program, model, threads=threads, samples=samples, skip=skip).image
+            return lambda: (
+                draw_program(program, model, threads=threads, samples=samples, skip=skip, patient=True).image
+            )
         if skip:
             return lambda: draw_small(program, threads=threads, samples=samples).image
         return lambda: draw_objects(load_arrays(name).network, program, samples=samples, skip=skip).image

@@ -93,7 +93,7 @@ def sized(scene: Scene, manifest: Manifest) -> Scene:
 def draw_scene(model: Model, scene: Scene, threads: int = 1) -> tuple[Program, Image]:
     """Compile a scene and draw it with a model."""
     program = compile_scene(scene, model=model.manifest.name, codes=model.codes)
-    return program, draw_program(program, model, threads=threads).image
+    return program, draw_program(program, model, threads=threads, patient=True).image
 
 
 def spread(values: Sequence[float], bad_end: int) -> dict[str, float]:

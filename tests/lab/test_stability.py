@@ -44,7 +44,7 @@ RECORDED = {
     if (RESULTS / file).exists()
 }
 MOST = {(model, name): 16 for model in RECORDED for name in ("objects", "blends")}
-MOST |= {("shapes2d", "canvas"): 256, ("solids3d", "canvas"): 128}
+MOST |= {("shapes2d", "canvas"): 256, ("solids3d", "canvas"): 128, ("solids3d", "deep"): 2}
 EVERY = [(model, name) for model in RECORDED for name in RECORDED[model]["probes"]]
 
 
