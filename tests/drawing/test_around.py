@@ -222,6 +222,20 @@ def test_no_light_comes_into_what_is_closed(sky: str) -> None:
     assert np.all(around.lattice[:, 6:] == 0)
 
 
+@pytest.mark.parametrize("ground", ["ground(none);", ""])
+def test_no_light_comes_into_a_room_of_slabs(ground: str) -> None:
+    """Few of its nodes lie inside; they take nothing from those of the outsides."""
+    walls = " ".join(
+        f"box {{ scale({', '.join(['2.6'] * axis + ['0.26'] + ['2.6'] * (2 - axis))}); "
+        f"translate({', '.join(['0'] * axis + [side] + ['0'] * (2 - axis))}); {GREY} }}"
+        for axis in range(3)
+        for side in ("1", "-1")
+    )
+    eye = "canvas(24, 24); camera([0.2, 0.1, 0.3], [-1, -0.2, -1]);"
+    text = f"nsg 1; {eye} sky(3); light(none); {ground} {walls}"
+    assert np.asarray(nsg.render(nsg.compile(nsg.loads(text)))).mean() < 0.02
+
+
 def test_nodes_on_the_outside_of_a_thin_slab_see_all_of_the_sky() -> None:
     """There distances are small for their gradient, and rays that begin too near met their own surface."""
     around = around_of(f"""nsg 1; canvas(24, 24); ground(none); light(none); sky(2, #fff, #fff);

@@ -53,7 +53,7 @@ EXACT = 1e-3  # the part of the light that bounces leave out at most
 NEAREST, CLOSE = 12, 64  # nodes that a place takes light from, of so many nearby
 TURNED, AWAY = 0.3, 1e3  # cosine, and what sorts out nodes that no way of a cell meets
 GOLDEN = 2.399963  # radians
-CLOSED = 0.1  # of nodes on objects, more of which see nothing but objects in what is closed
+CLOSED = 0.02  # of nodes on objects, more of which see nothing but objects in what is closed
 # so far before surfaces, in world units, parts of a way, and at most, ways begin and end that walls may cross
 APART, RISE, HIGHEST = 0.02, 0.3, 0.1
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
