@@ -53,18 +53,18 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
         F kind = max2(c->own[3] * x->d + c->past[3] * a->d + c->bias[3], c->own[4] * x->d + c->past[4] * a->d + c->bias[4]);
         M differ = wanted & KIND ? size_of(a->kind - x->kind) > 0.5f : ints(0);
         if ((wanted & KIND) && (wanted & REGISTER_)) differ |= (a->kind + x->kind > 1.0f) & (unlike(s, a->look, x->look) > JUMP);
-        M every = in;  // on surfaces in one plane the earlier one's material shows, whichever rounding puts in front
+        M shows = in;  // on surfaces in one plane the earlier one's material, whichever rounding puts in front
         if ((wanted & REGISTER_) && !(wanted & KIND) && !c->smooth) {
             M opaque = (a->look[s->rows - 1] < 0.5f) & (x->look[s->rows - 1] < 0.5f);
-            in &= ~(opaque & (size_of(a->d - x->d) < EQUAL) & (size_of(x->d) < NEARLY));
+            shows &= ~(opaque & (size_of(a->d - x->d) < EQUAL) & (size_of(x->d) < NEARLY));
         }
         if (wanted & REGISTER_) {
             F paint = max2(c->own[1] * x->d + c->past[1] * a->d + c->bias[1], c->own[2] * x->d + c->past[2] * a->d + c->bias[2]);
-            F gates[2] = {sel(in, clamp(paint, 0, 1), all(0)), sel(in, clamp(kind, 0, 1), all(0))};
+            F gates[2] = {sel(shows, clamp(paint, 0, 1), all(0)), sel(shows, clamp(kind, 0, 1), all(0))};
             for (int k = 0; k < s->rows; k++)
                 a->look[k] += gates[k >= s->rows - s->switched] * (x->look[k] - a->look[k]);
         }
-        M held = in & (kind > 0.5f);
+        M held = shows & (kind > 0.5f);
         if (wanted & KIND) {
             F room = size_of(x->d);  // within which the operand leaves the kind of material, or the medium, as it is
             if (c->smooth) room = min2(room, 0.5f * size_of(a->d - x->d));
@@ -73,7 +73,6 @@ IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, cons
             a->kind += sel(in, clamp(kind, 0, 1), all(0)) * (x->kind - a->kind);
         }
         if (wanted & OWNER) a->owner = (x->owner & held) | (a->owner & ~held);
-        in = every;
     }
     a->d = sel(in, after, a->d);
 }

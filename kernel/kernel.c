@@ -23,7 +23,7 @@ IN int64_t asked(const Scene *s, int64_t n, const float *p, const float *reach, 
         F own;
         M some;
         float far = 0;
-        read_points(p, n, i, &q);
+        q = read_points(p, n, n, i);
         for (int k = 0; k < W; k++) {
             int64_t j = i + k < n ? i + k : n - 1;
             own[k] = reach[j]; some[k] = i + k < n ? -1 : 0;
@@ -54,7 +54,7 @@ void NAME(own)(const Scene *s, int64_t n, const int32_t *object, const float *p,
     for (int64_t i = 0; i < n; i += W) {
         V q, more;
         M owner = ints(0);
-        read_points(p, n, i, &q);
+        q = read_points(p, n, n, i);
         for (int k = 0; k < W && i + k < n; k++) owner[k] = object[i + k] + 1;
         F d = colour ? alone(s, owner, q, &more, REGISTER_) : gradient ? alone(s, owner, q, &more, GRADIENT) : alone(s, owner, q, &more, DISTANCE);
         if (!colour) store(distance, n, i, d);
@@ -78,9 +78,9 @@ IN int64_t followed(const Scene *s, int64_t n, int64_t origins, const float *p, 
             float axis[3], cosine = cone_of(way, n, i + BLOCK * W < n ? i + BLOCK * W : n, i, axis);
             count = in_cone(s, p, axis, cosine, list);
         }
-        read_points(way, n, i, &to);
+        to = read_points(way, n, n, i);
         if (origins == 1) from = (V){all(p[0]), all(p[1]), all(p[2])};
-        else read_points(p, n, i, &from);
+        else from = read_points(p, n, n, i);
         for (int k = 0; k < W; k++) {
             int64_t j = i + k < n ? i + k : n - 1;
             low[k] = begin[j]; high[k] = i + k < n ? limit[j] : -BIG;
@@ -127,8 +127,8 @@ void NAME(cones)(const Scene *s, int64_t n, const float *at, float radius, const
             count = in_cone(s, at, axis, cosine, list);
         }
         Cone c = {.at = from, .radius = radius};
-        read_points(way, n, i, &c.way);
-        read_points(normal, n, i, &c.normal);
+        c.way = read_points(way, n, n, i);
+        c.normal = read_points(normal, n, n, i);
         M there = ints(0);
         for (int k = 0; k < W; k++) {
             int64_t j = i + k < n ? i + k : n - 1;
@@ -216,18 +216,90 @@ void NAME(haze)(const Scene *s, const Around *a, int64_t n, const float *p, cons
         memcpy(clear + from, l->clear, 4 * (size_t)some);
     }
 }
-void NAME(passed_on)(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const float *base,
-                     const float *surface, const float *source, const float *light, float *along, float *result) {
-    passed_on(n, far, share, here, next, clear, (const Q *)base, (const Q *)surface, (const Q *)source, (const Q *)light, (Q *)along,
-              (Q *)result);
+// Light of media along parallel lines through the n nodes of a lattice, from each to the next, `far` on in a row of all: of
+// sources here and there, what joins, what surfaces between send back of the light that was, and the part of the next one's
+// that comes through. A share of it is added to the result.
+void NAME(passed_on)(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const Q *base,
+                      const Q *surface, const Q *source, const Q *light, Q *along, Q *result) {
+    for (int64_t k = 0; k < n; k++) {
+        int64_t i = far > 0 ? n - 1 - k : k, on = i + far;
+        Q sum = here[i] * source[i] + base[i];
+        if (surface) sum += surface[i] * light[i];
+        if (on >= 0 && on < n) sum += next[i] * source[on] + clear[i] * along[on];
+        along[i] = sum;
+        result[i] += share * sum;
+    }
 }
-void NAME(evened)(const View *view, const float *p, const float *normal, int32_t rows, const float *values, int32_t step,
-                  int32_t part, float *out) {
-    evened(view, p, normal, rows, values, step, part, out);
+// Rows of values (rows, n) of a lattice's points (3, n) that planes have, by least squares over the points so many steps
+// around that lie on the same surface; parts 1 and 2 are how much a plane rises to the next point across and down.
+void NAME(evened)(const View *v, const float *p, const float *normal, int rows, const float *values, int step, int part, float *out) {
+    int32_t columns = (int32_t)v->columns, many = (int32_t)v->rows;
+    int64_t n = (int64_t)columns * many;
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_points(p, n, n, i), up = read_points(normal, n, n, i);
+        F side = max2(dot(minus(q, constant(v->eye)), constant(v->forward)), all(1e-6f)) * (v->step / v->scale * step);
+        F fit[9], whole = all(0), x = all(0), y = all(0), xx = all(0), xy = all(0), yy = all(0), share = all(0);
+        M at[9];
+        for (int k = 0; k < 9; k++) {
+            int right = k % 3 - 1, down = k / 3 - 1;
+            for (int w = 0; w < W; w++) {
+                int32_t j = (int32_t)(i + w < n ? i + w : n - 1), c = j % columns + step * right, r = j / columns + step * down;
+                at[k][w] = (r < 0 ? 0 : r < many ? r : many - 1) * columns + (c < 0 ? 0 : c < columns ? c : columns - 1);
+            }
+            fit[k] = on_one(q, up, gathered3(p, n, at[k]), gathered3(normal, n, at[k]), side) * (float)((right ? 1 : 2) * (down ? 1 : 2));
+            whole += fit[k];
+        }
+        whole = 1.0f / max2(whole, all(1e-9f));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            fit[k] *= whole;
+            x += fit[k] * right; y += fit[k] * down;
+            xx += fit[k] * (right * right + LEVEL); xy += fit[k] * (right * down); yy += fit[k] * (down * down + LEVEL);
+        }
+        F less = 1.0f / max2(xx * yy - xy * xy, all(LEVEL * LEVEL));
+        for (int k = 0; k < 9; k++) {
+            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
+            F across = fit[k] * less * (yy * right - xy * down), below = fit[k] * less * (xx * down - xy * right);
+            fit[k] = part == 1 ? across : part == 2 ? below : fit[k] - x * across - y * below;
+            share += fit[k];
+        }
+        if (part) fit[4] -= share;
+        else for (int k = 0; k < 9; k++) fit[k] /= max2(share, all(1e-9f));
+        for (int row = 0; row < rows; row++) {
+            F sum = all(0);
+            for (int k = 0; k < 9; k++) sum += fit[k] * gather(values + row * n, at[k]);
+            store(out + row * n, n, i, sum);
+        }
+    }
 }
-void NAME(between)(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int32_t values, float *out,
-                   int32_t *fits) {
-    between(n, p, normal, view, seen, values, out, fits);
+// What points (3, n) with unit normals have of `values` of a lattice, on the same surface. With some corners of a cell
+// elsewhere, the others tell how values go on. A point of `seen` is a place, a normal, values, and how these change from it
+// to the next across, and down. `fits` tells where a corner is.
+void NAME(between)(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int values, float *out,
+                    int32_t *fits) {
+    int row = 6 + 3 * values;
+    float step = view->step, columns = view->columns, rows = view->rows;
+    for (int64_t i = 0; i < n; i += W) {
+        V q = read_points(p, n, n, i), up = read_points(normal, n, n, i), off = minus(q, constant(view->eye));
+        F ahead = max2(dot(off, constant(view->forward)), all(1e-6f)), side = ahead * (step / view->scale);
+        F u = clamp((view->scale * dot(off, constant(view->right)) / ahead + view->middle[0]) / step, 0, columns - 1.001f);
+        F v = clamp((view->middle[1] - view->scale * dot(off, constant(view->up)) / ahead) / step, 0, rows - 1.001f);
+        F total = all(0), most = all(0), across = all(0), down = all(0), sum[18];
+        for (int k = 0; k < 3 * values; k++) sum[k] = all(0);
+        for (int corner = 0; corner < 4; corner++) {
+            F x = min2(lower(u) + (float)(corner >> 1), all(columns - 1)), y = min2(lower(v) + (float)(corner & 1), all(rows - 1));
+            M at = cut(y * columns + x) * row;
+            F fit = on_one(q, up, gathered3(seen, 1, at), gathered3(seen + 3, 1, at), side);
+            F weight = fit * (max2(1.0f - size_of(u - x), all(0)) * max2(1.0f - size_of(v - y), all(0)) + 0.02f);
+            total += weight; most = max2(fit, most);
+            across += weight * (u - x); down += weight * (v - y);
+            for (int k = 0; k < 3 * values; k++) sum[k] += weight * gather(seen + 6 + k, at);
+        }
+        F each = 1.0f / max2(total, all(1e-9f));
+        for (int k = 0; k < values; k++)
+            store(out + k * n, n, i, max2((sum[k] + (across * sum[values + k] + down * sum[2 * values + k]) * each) * each, all(0)));
+        store((float *)fits, n, i, (F)(most > 0.5f));
+    }
 }
 // Where n lines from points (3, n) all the way (3, n) meet the surfaces of objects alone, by their numbers: lines and how far
 // along, from 0 to 1, as many as there is room for; their number. Steps are as long as the distance, which changes at rates
@@ -270,7 +342,7 @@ void NAME(mirrored)(int64_t n, const float *at, float radius, const float *p, co
     for (int64_t i = 0; i < n; i += W) {
         V q, up, to, part;
         F uneven;
-        read_points(p, n, i, &q); read_points(normal, n, i, &up); read_points(back, n, i, &to); read_points(straight, n, i, &part);
+        q = read_points(p, n, n, i); up = read_points(normal, n, n, i); to = read_points(back, n, n, i); part = read_points(straight, n, n, i);
         for (int k = 0; k < W; k++) uneven[k] = rough[i + k < n ? i + k : n - 1];
         V r = mirrored(lamp, radius, q, up, uneven, to, part);
         store(light, n, i, r.x); store(light + n, n, i, r.y); store(light + 2 * n, n, i, r.z);

@@ -82,18 +82,6 @@ static int64_t cell_at(const Around *a, const float p[3], const float way[3]) {
         cell = cell * a->counts[d] + (int)fminf(fmaxf((p[d] - a->low[d]) / a->side, 0), a->counts[d] - 1);
     return cell;
 }
-static float sum_of(F a) {
-    float r[W];
-    memcpy(r, &a, sizeof r);
-    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] += r[k + half];
-    return r[0];
-}
-static float most_of(F a) {
-    float r[W];
-    memcpy(r, &a, sizeof r);
-    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] = r[k] > r[k + half] ? r[k] : r[k + half];
-    return r[0];
-}
 IN M groups_of(const uint8_t *alike) {  // of nodes of a cell
     typedef uint8_t B __attribute__((vector_size(W)));
     B r;
@@ -266,20 +254,6 @@ static void haze_of(const Around *a, Level *l, int n) {
         }
         keep3(&l->haze, i, light);
         keep(l->clear, i, through);
-    }
-}
-// Light of media along parallel lines through the n nodes of a lattice, from each to the next, `far` on in a row of all: of
-// sources here and there, what joins, what surfaces between send back of the light that was, and the part of the next one's
-// that comes through. A share of it is added to the result.
-static void passed_on(int64_t n, int64_t far, float share, const float *here, const float *next, const float *clear, const Q *base,
-                      const Q *surface, const Q *source, const Q *light, Q *along, Q *result) {
-    for (int64_t k = 0; k < n; k++) {
-        int64_t i = far > 0 ? n - 1 - k : k, on = i + far;
-        Q sum = here[i] * source[i] + base[i];
-        if (surface) sum += surface[i] * light[i];
-        if (on >= 0 && on < n) sum += next[i] * source[on] + clear[i] * along[on];
-        along[i] = sum;
-        result[i] += share * sum;
     }
 }
 // Light of lamps, whose middles tell of all of them, at places (n) that send rays again, into `lit`.
@@ -457,8 +431,8 @@ static void glowing(Gather *w, int64_t n, const float *p, const float *normal, f
         V q, up = {all(0), all(0), all(0)}, sum = up;
         F whole = all(0), turn, before = all(0), running = all(0);
         float both[6 * W] = {0};
-        read_points(p, n, i, &q);
-        if (normal) read_points(normal, n, i, &up);
+        q = read_points(p, n, n, i);
+        if (normal) up = read_points(normal, n, n, i);
         for (int d = 0; d < a->discs; d++) {
             const float *disc = a->disc + 10 * d;
             F f = disc_form(disc, q, up, normal != 0);
@@ -557,74 +531,3 @@ IN V gathered3(const float *from, int64_t n, M at) { return (V){gather(from, at)
 // A picture's lattice, of points row by row: the eye, the camera's forward, right and up, pixels of a world unit at a distance
 // of 1, half the picture's sides, the lattice's step in pixels, its columns and rows.
 typedef struct { float eye[3], forward[3], right[3], up[3], scale, middle[2], step, columns, rows; } View;
-// Rows of values (rows, n) of a lattice's points (3, n) that planes have, by least squares over the points so many steps
-// around that lie on the same surface; parts 1 and 2 are how much a plane rises to the next point across and down.
-static void evened(const View *v, const float *p, const float *normal, int rows, const float *values, int step, int part, float *out) {
-    int32_t columns = (int32_t)v->columns, many = (int32_t)v->rows;
-    int64_t n = (int64_t)columns * many;
-    for (int64_t i = 0; i < n; i += W) {
-        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i);
-        F side = max2(dot(minus(q, constant(v->eye)), constant(v->forward)), all(1e-6f)) * (v->step / v->scale * step);
-        F fit[9], whole = all(0), x = all(0), y = all(0), xx = all(0), xy = all(0), yy = all(0), share = all(0);
-        M at[9];
-        for (int k = 0; k < 9; k++) {
-            int right = k % 3 - 1, down = k / 3 - 1;
-            for (int w = 0; w < W; w++) {
-                int32_t j = (int32_t)(i + w < n ? i + w : n - 1), c = j % columns + step * right, r = j / columns + step * down;
-                at[k][w] = (r < 0 ? 0 : r < many ? r : many - 1) * columns + (c < 0 ? 0 : c < columns ? c : columns - 1);
-            }
-            fit[k] = on_one(q, up, gathered3(p, n, at[k]), gathered3(normal, n, at[k]), side) * (float)((right ? 1 : 2) * (down ? 1 : 2));
-            whole += fit[k];
-        }
-        whole = 1.0f / max2(whole, all(1e-9f));
-        for (int k = 0; k < 9; k++) {
-            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
-            fit[k] *= whole;
-            x += fit[k] * right; y += fit[k] * down;
-            xx += fit[k] * (right * right + LEVEL); xy += fit[k] * (right * down); yy += fit[k] * (down * down + LEVEL);
-        }
-        F less = 1.0f / max2(xx * yy - xy * xy, all(LEVEL * LEVEL));
-        for (int k = 0; k < 9; k++) {
-            float right = (float)(k % 3 - 1), down = (float)(k / 3 - 1);
-            F across = fit[k] * less * (yy * right - xy * down), below = fit[k] * less * (xx * down - xy * right);
-            fit[k] = part == 1 ? across : part == 2 ? below : fit[k] - x * across - y * below;
-            share += fit[k];
-        }
-        if (part) fit[4] -= share;
-        else for (int k = 0; k < 9; k++) fit[k] /= max2(share, all(1e-9f));
-        for (int row = 0; row < rows; row++) {
-            F sum = all(0);
-            for (int k = 0; k < 9; k++) sum += fit[k] * gather(values + row * n, at[k]);
-            store(out + row * n, n, i, sum);
-        }
-    }
-}
-// What points (3, n) with unit normals have of `values` of a lattice, on the same surface. With some corners of a cell
-// elsewhere, the others tell how values go on. A point of `seen` is a place, a normal, values, and how these change from it
-// to the next across, and down. `fits` tells where a corner is.
-static void between(int64_t n, const float *p, const float *normal, const View *view, const float *seen, int values, float *out,
-                    int32_t *fits) {
-    int row = 6 + 3 * values;
-    float step = view->step, columns = view->columns, rows = view->rows;
-    for (int64_t i = 0; i < n; i += W) {
-        V q = read_some(p, n, n, i), up = read_some(normal, n, n, i), off = minus(q, constant(view->eye));
-        F ahead = max2(dot(off, constant(view->forward)), all(1e-6f)), side = ahead * (step / view->scale);
-        F u = clamp((view->scale * dot(off, constant(view->right)) / ahead + view->middle[0]) / step, 0, columns - 1.001f);
-        F v = clamp((view->middle[1] - view->scale * dot(off, constant(view->up)) / ahead) / step, 0, rows - 1.001f);
-        F total = all(0), most = all(0), across = all(0), down = all(0), sum[18];
-        for (int k = 0; k < 3 * values; k++) sum[k] = all(0);
-        for (int corner = 0; corner < 4; corner++) {
-            F x = min2(lower(u) + (float)(corner >> 1), all(columns - 1)), y = min2(lower(v) + (float)(corner & 1), all(rows - 1));
-            M at = cut(y * columns + x) * row;
-            F fit = on_one(q, up, gathered3(seen, 1, at), gathered3(seen + 3, 1, at), side);
-            F weight = fit * (max2(1.0f - size_of(u - x), all(0)) * max2(1.0f - size_of(v - y), all(0)) + 0.02f);
-            total += weight; most = max2(fit, most);
-            across += weight * (u - x); down += weight * (v - y);
-            for (int k = 0; k < 3 * values; k++) sum[k] += weight * gather(seen + 6 + k, at);
-        }
-        F each = 1.0f / max2(total, all(1e-9f));
-        for (int k = 0; k < values; k++)
-            store(out + k * n, n, i, max2((sum[k] + (across * sum[values + k] + down * sum[2 * values + k]) * each) * each, all(0)));
-        store((float *)fits, n, i, (F)(most > 0.5f));
-    }
-}

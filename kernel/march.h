@@ -217,16 +217,14 @@ static int in_cone(const Scene *s, const float at[3], const float axis[3], float
 static float cone_of(const float *way, int64_t n, int64_t end, int64_t from, float axis[3]) {
     V sum = {all(0), all(0), all(0)};
     F least = all(1);
-    float length = 0, lowest = 1;
-    for (int64_t i = from; i < end; i += W) sum = plus(sum, read_some(way, n, end, i));
-    axis[0] = axis[1] = axis[2] = 0;
-    for (int k = 0; k < W; k++) { axis[0] += sum.x[k]; axis[1] += sum.y[k]; axis[2] += sum.z[k]; }
+    float length = 0;
+    for (int64_t i = from; i < end; i += W) sum = plus(sum, read_points(way, n, end, i));
+    axis[0] = sum_of(sum.x); axis[1] = sum_of(sum.y); axis[2] = sum_of(sum.z);
     for (int d = 0; d < 3; d++) length += axis[d] * axis[d];
     length = sqrtf(length);
     if (!(length > 1e-6f)) return -1;
     for (int d = 0; d < 3; d++) axis[d] /= length;
     V middle = {all(axis[0]), all(axis[1]), all(axis[2])};
-    for (int64_t i = from; i < end; i += W) least = min2(dot(read_some(way, n, end, i), middle), least);
-    for (int k = 0; k < W; k++) lowest = least[k] < lowest ? least[k] : lowest;
-    return lowest - 1e-5f;
+    for (int64_t i = from; i < end; i += W) least = min2(dot(read_points(way, n, end, i), middle), least);
+    return -most_of(-least) - 1e-5f;
 }

@@ -8,21 +8,15 @@ typedef struct { V at; M in; const Object *object; int far; } Near;  // an objec
 // Objects, as numbers that rise, that points of packets from `from` on may meet within their reach.
 static int listed(const Scene *s, const float *p, const float *reach, int64_t n, int64_t from, int32_t *list) {
     V low = {all(BIG), all(BIG), all(BIG)}, high = {all(-BIG), all(-BIG), all(-BIG)};
-    float far = 0, least[3] = {BIG, BIG, BIG}, most[3] = {-BIG, -BIG, -BIG}, centre[3], ball = 0;
+    float far = 0, centre[3], ball = 0;
     for (int64_t i = from; i < n && i < from + BLOCK * W; i += W) {
         V q;
-        read_points(p, n, i, &q);
+        q = read_points(p, n, n, i);
         low = (V){min2(q.x, low.x), min2(q.y, low.y), min2(q.z, low.z)};
         high = (V){max2(q.x, high.x), max2(q.y, high.y), max2(q.z, high.z)};
         for (int k = 0; k < W && i + k < n; k++) far = reach[i + k] > far ? reach[i + k] : far;
     }
-    for (int k = 0; k < W; k++) {
-        float a[3] = {low.x[k], low.y[k], low.z[k]}, b[3] = {high.x[k], high.y[k], high.z[k]};
-        for (int d = 0; d < 3; d++) {
-            least[d] = a[d] < least[d] ? a[d] : least[d];
-            most[d] = b[d] > most[d] ? b[d] : most[d];
-        }
-    }
+    float least[3] = {-most_of(-low.x), -most_of(-low.y), -most_of(-low.z)}, most[3] = {most_of(high.x), most_of(high.y), most_of(high.z)};
     for (int d = 0; d < 3; d++) {
         centre[d] = 0.5f * (least[d] + most[d]);
         ball += 0.25f * (most[d] - least[d]) * (most[d] - least[d]);

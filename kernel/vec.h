@@ -106,10 +106,21 @@ IN F read_row(const float *p, int64_t end, int64_t at) {  // the last number sta
     else for (int k = 0; k < W; k++) r[k] = p[at + k < end ? at + k : end - 1];
     return r;
 }
-IN V read_some(const float *p, int64_t n, int64_t end, int64_t at) {
+IN V read_points(const float *p, int64_t n, int64_t end, int64_t at) {
     return (V){read_row(p, end, at), read_row(p + n, end, at), read_row(p + 2 * n, end, at)};
 }
-IN void read_points(const float *p, int64_t n, int64_t at, V *q) { *q = read_some(p, n, n, at); }
+IN float sum_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] += r[k + half];
+    return r[0];
+}
+IN float most_of(F a) {
+    float r[W];
+    memcpy(r, &a, sizeof r);
+    for (int half = W / 2; half; half /= 2) for (int k = 0; k < half; k++) r[k] = r[k] > r[k + half] ? r[k] : r[k + half];
+    return r[0];
+}
 IN void store(float *to, int64_t n, int64_t at, F values) {
     if (at + W <= n) memcpy(to + at, &values, sizeof values);
     else memcpy(to + at, &values, 4 * (size_t)(n - at));
