@@ -43,7 +43,6 @@ class Arrays:
     packed: ClassVar[Any] = staticmethod(np.ascontiguousarray)  # the same entries, contiguous in memory
     where: ClassVar[Any] = staticmethod(lambda mask: mask.nonzero()[0])  # indices (k,) of a mask (M,)
     order: ClassVar[Any] = staticmethod(lambda x: x.argsort(kind="stable"))  # indices that sort (M,)
-    rising: ClassVar[Any] = staticmethod(lambda x: np.sort(x, 0))  # rows of (R, M) that rise
     take: ClassVar[Any] = staticmethod(lambda x, index: x.take(index, -1))  # entries (…, k) of (…, M)
     frozen: ClassVar[Any] = staticmethod(lambda x: x)  # the same numbers, without their gradients
     wide: ClassVar[Any] = staticmethod(lambda x: x.astype(np.float64))

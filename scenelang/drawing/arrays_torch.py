@@ -29,7 +29,6 @@ class Torch(Arrays):
     packed = staticmethod(Tensor.contiguous)
     where = staticmethod(_where)
     order = staticmethod(lambda x: x.argsort(stable=True))
-    rising = staticmethod(lambda x: x.sort(0).values)
     take = staticmethod(lambda x, index: x.index_select(-1, index))  # many times as fast as a subscript
     put = staticmethod(lambda x, index, values: x.index_copy_(-1, index, values))
     add = staticmethod(lambda x, index, values: x.index_add_(-1, index, values))

@@ -568,7 +568,7 @@ def load_kernel() -> Kernel:
     if source is None:
         return Kernel(path)
     # looked for in the file, as a library that was loaded once is not loaded again from the same place
-    if path.is_file() and source.mark().encode() in path.read_bytes():
+    if source.is_built(path):
         return Kernel(path)
     if importlib.util.find_spec("ziglang") is None:
         raise KernelError("the kernel's library is not that of kernel/; pip install ziglang, which builds it")

@@ -476,9 +476,8 @@ def _line(font: Font, text: Any, size: Any) -> tuple[list[Placed], float]:
     try:
         return font.line(text)
     except FontError as error:
-        help = "`scenelang learn Font.ttf` makes a font of letters of your own"
-        if "break" in str(error):
-            help = "texts are one line each; write one for each line"
+        learnt = "`scenelang learn Font.ttf` makes a font of letters of your own"
+        help = "texts are one line each; write one for each line" if "break" in str(error) else learnt
         raise Problem("E0370", str(error), help, operand=0, letter=error.at) from None
 
 

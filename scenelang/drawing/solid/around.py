@@ -350,7 +350,7 @@ class Around:
             xp.put(result, alone, 0 * xp.take(result, alone) + UNKNOWN)
         elif len(alone):
             here, up = xp.take(p, alone), xp.take(n, alone)
-            numbers = np.rint(np.asarray(self._places(here)[1:], np.float64) * (EIGHTHS * self.step))
+            numbers = np.rint(np.asarray(self._places(here), np.float64) * (EIGHTHS * self.step))
             xp.put(result[:3], alone, self.gathered(here, up, numbers, PIXEL_RAYS, self.hollow)[:3])
             result[3:, alone] = self.glow(here, up, self.worth)[1][: len(result) - 3]
         if not self.emitters.there:
@@ -400,16 +400,16 @@ class Around:
         finer, until = finer and not self.emitters.there, self.field.network.until_s
         return load_kernel().arriving(self.field.tables, self.row, p, way, finer, until)
 
-    def _places(self, p: Array) -> tuple[Array, Array, Array]:
-        """Sides (K,) in world units of cells of the lattice where points (3, K) are, and their places."""
+    def _places(self, p: Array) -> Array:
+        """Places (2, K) on the lattice, across and down, where the eye sees points (3, K)."""
         scale, *middle, step, columns, rows = self.view[12:].tolist()
         forward, right, up = self.view[3:12].reshape(3, 3) @ (p - self.view[:3, None])
         ahead = forward.clip(1e-6)
-        u, v = (
+        places = [
             ((scale * off / ahead + half) / step).clip(0.0, count - 1.001)
             for off, half, count in zip((right, -up), middle, (columns, rows), strict=True)
-        )
-        return ahead * (step / scale), u, v
+        ]
+        return np.stack(places)
 
     def _smoothed(self, light: Array) -> Array:
         """Light (3, L) of the lattice without the noise of rays: of points next to each, and of those farther
