@@ -129,7 +129,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
     points = [point(other, 5, 0.02, model=other), point("shapes2d", 16, 0.003)]
     (shipped.path / "shipped.json").write_text(frontier(*points).to_json(), "utf-8")
     text = said(shipped, "--max-flip 0.9", SMALL)
-    assert f"chosen by the frontier: {other}: " in text
+    assert f"chosen by the frontier: {other}: 5.0 ms" in text
     assert f"model {other} (chosen by the frontier)" in text
     assert other in said(shipped, "--max-flip 0.9", f'model "shapes2d"; {SMALL}')
 
@@ -141,7 +141,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
 
     monkeypatch.setattr(inputs, "compile_scene", warns)
     text = said(shipped, "--max-flip 0.9", SMALL)
-    assert "chosen by the frontier: shapes2d: " in text
+    assert "chosen by the frontier: shapes2d: 16 ms" in text
     assert f"not in question: {other}: 4 objects, trained on 3" in text
 
 

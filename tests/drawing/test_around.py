@@ -108,7 +108,7 @@ def test_light_goes_on_beyond_the_last_point_of_a_surface() -> None:
         lattice = np.ascontiguousarray(np.concatenate([*around.seen, plane, *parts[1:]]).T, np.float32)
         x = np.linspace(-0.74, 0.74, 150, dtype=np.float32)  # the top's sides are at 0.75
         p = np.stack([np.tile(x, 150), np.full(22500, 1.3 / 3**0.5, np.float32), np.repeat(x, 150)])
-        _, u, v = around._places(p)
+        u, v = around._places(p)
         n = np.float32([[0], [1], [0]]) + 0 * p
         found, fits = load_kernel().between(p, n, around.view, lattice)
     assert fits.all()

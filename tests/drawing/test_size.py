@@ -45,7 +45,7 @@ def test_pictures_do_not_depend_on_the_unit(backend: str) -> None:
 
 
 def test_the_reference_does_not_depend_on_the_unit() -> None:
-    """Of all but soft lamps, and of a ball by such a lamp, which each take 144 ways to."""
+    """All but soft lamps, and a ball by such a lamp, to which each point takes 144 ways."""
     hard = SCENE.replace(", radius = 0.3 * k", "")
     for text in (hard, SOFT):
 

@@ -33,7 +33,7 @@ def discs(count: int) -> str:
 
 
 def counted(drawn: Program, monkeypatch: pytest.MonkeyPatch) -> float:
-    """How often the network is asked while a picture is drawn, and some of that for each ray and pixel."""
+    """Count the questions to the network while a picture is drawn, and some more for each ray and pixel."""
     count = around.EACH_PIXEL * float(np.prod(drawn.canvas))
     field, rays, gathered = Kernel.field, Kernel.rays, Kernel.around
 
