@@ -89,13 +89,17 @@ def to_mesh(
     with _reported():
         mesh, warnings = surface_of(program, resolution, backend == "exact")
     if not len(mesh.triangles):
-        help = "a mesh has what is opaque and solid"
-        diagnostics.add("E0552", f"nothing is left for a mesh{written(program.places)}", None, help=help)
-        raise SceneError(diagnostics)
+        raise _empty(program, diagnostics)
     finer = f"a finer mesh has more: --resolution {min(2 * resolution, FINEST)}"
     for code, fact in warnings.items():
         diagnostics.add(code, fact, None, help=finer if code == "W0552" and "W0553" not in warnings else None)
     return mesh
+
+
+def _empty(program: Program, diagnostics: Diagnostics) -> SceneError:
+    help = "a mesh has what is opaque and solid"
+    diagnostics.add("E0552", f"nothing is left for a mesh{written(program.places)}", None, help=help)
+    return SceneError(diagnostics)
 
 
 @contextmanager
@@ -131,6 +135,8 @@ def _program(
             program = compile_scene(scene, spans=spans, diagnostics=diagnostics, without=without)
         except FileNotFoundError as error:
             raise RenderError(f"a model has no weights here: {error.filename}") from None
+    if not flat and not len(program):
+        raise _empty(program, diagnostics)  # which is neither flat nor of space
     if (program.stage is None) != flat:
         fact = ("an SVG of solids" if flat else "a mesh of a flat scene") + written(program.places)
         other = "write a mesh, such as .glb, or a picture" if flat else "write an .svg or a picture"

@@ -202,6 +202,9 @@ def test_the_command_writes_a_file_or_nothing(tmp_path: Path) -> None:
     mist = CliRunner().invoke(cli, ["render", str(tmp_path / "mist.nsg"), "-o", str(tmp_path / "c.stl")])
     assert "error[E0552]" in mist.output
     assert "mist.nsg:2:1)" in mist.output  # where it begins
+    (tmp_path / "none.nsg").write_text('import "std/solids" as s;\ns.wedge(-1);')
+    none = CliRunner().invoke(cli, ["render", str(tmp_path / "none.nsg"), "-o", str(tmp_path / "c.stl")])
+    assert "error[E0552]: nothing is left" in none.output  # not that it is flat
     for out, options, said in (
         ("a.svg", [], "E0551"),
         ("b.stl", ["--size", "64x64"], "--size is of pictures"),
