@@ -198,6 +198,10 @@ def test_nothing_is_drawn_without_extent() -> None:
         found = nsg.Diagnostics()
         assert len(nsg.compile(nsg.loads(f"{IMPORT} s.{call};"), diagnostics=found)) == 0, call
         assert {d.code for d in found} <= {"W0401"}, call
+    solids = """ball(0); block(1, 0); ring(-1); pill(X, Y, -1); wedge(-1); prism(3, -1); tube(1, 1, -1);
+        pyramid(1, -1)"""
+    for call in map(str.strip, solids.split(";")):
+        assert len(nsg.compile(nsg.loads(f'import "std/solids" as s; s.{call};'))) == 0, call
 
 
 def test_it_is_found_from_anywhere(tmp_path: Path) -> None:
@@ -290,6 +294,10 @@ SOLIDS = {
     "spike(0.5, 1.2)": lambda x, y, z: max(math.hypot(x, z) - 0.5 * (0.6 - y) / 1.2, -y - 0.6),
     "ring(0.6, 0.3)": lambda x, y, z: math.hypot(math.hypot(x, z) - 0.6, y) - 0.15,
     "tube(0.6, 1, 0.2)": lambda x, y, z: max(abs(math.hypot(x, z) - 0.5) - 0.1, abs(y) - 0.5),
+    "tube(0.5, 1, 0.7)": lambda x, y, z: max(math.hypot(x, z) - 0.5, abs(y) - 0.5),
+    "block(1, -0.6, 0.8)": lambda x, y, z: max(abs(x) - 0.5, abs(y) - 0.3, abs(z) - 0.4),
+    "spike(0.5, -1.2)": lambda x, y, z: max(math.hypot(x, z) - 0.5 * (0.6 + y) / 1.2, y - 0.6),
+    "dome(-0.8)": lambda x, y, z: max(math.hypot(x, y, z) - 0.8, -y),
     "dome(0.8)": lambda x, y, z: max(math.hypot(x, y, z) - 0.8, -y),
     "wedge(1, 0.6, 0.8)": lambda x, y, z: max(abs(x) - 0.5, abs(z) - 0.4, y - 0.6 * x, -y - 0.3),
     "pyramid(1, 1.2)": lambda x, y, z: max(max(abs(x), abs(z)) - (0.6 - y) / 2.4, -y - 0.6),
@@ -298,6 +306,7 @@ SOLIDS = {
     "rounded(1, 0.8, 0.6, 0.2)": lambda x, y, z: (
         math.hypot(max(abs(x) - 0.3, 0), max(abs(y) - 0.2, 0), max(abs(z) - 0.1, 0)) - 0.2
     ),
+    "rounded(0.8, -0.8, 0.8, 9)": lambda x, y, z: math.hypot(x, y, z) - 0.4,
     "pill([0.3, -0.2, 0.1], [-0.4, -0.2, 0.1], 0.3)": lambda x, y, z: (
         math.hypot(max(x - 0.3, -0.4 - x, 0), y + 0.2, z - 0.1) - 0.3
     ),
