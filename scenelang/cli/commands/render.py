@@ -428,7 +428,9 @@ def _blank(job: Input, image: Image) -> str | None:
     if any(d.code == "W0402" for d in job.diagnostics):
         return None
     if job.program is not None and not len(job.program.tokens):
-        return "no objects to draw: a module draws where it is called, as in part(), a shape where it has extent"
+        return (
+            "no objects to draw: a module draws where it is called, as in part(), and a shape of some extent"
+        )
     if not all(bool((abs(row - image[0, 0]) < 0.5 / 255).all()) for row in image):
         return None
     if (image[0, 0] > 1 - 0.5 / 255).all():
