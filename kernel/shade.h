@@ -82,8 +82,10 @@ IN void ask_slots(Job *j, int n, V way, F t, M in, Surface *r) {
     *r = (Surface){x->d, t, x->g, {rows_of(x->look, 0), rows_of(x->look, j->sheets > 1 ? 3 : 0)}, {all(0), all(0), all(0)}, x->owner};
     if (glow) r->glow = rows_of(x->look, glow);
 }
-IN F ahead(F d, F towards, float gap) {  // how far the surface is; along one, at a cosine over -0.02, d says nothing of it
-    return clamp(sel(towards < -0.02f, -d / sel(towards < -0.02f, towards, all(-1)), all(-INTO)), -gap, gap);
+// How far the surface is ahead. Along one, at a cosine over -0.02, d says nothing of it, but rays met it within `gap`.
+IN F ahead(F d, F towards, float gap) {
+    M along = towards >= -0.02f;
+    return clamp(sel(along, sel(d > 3 * INTO, all(gap), all(-INTO)), -d / sel(along, all(-1), towards)), -gap, gap);
 }
 // The mean colours of textures where four samples of a pixel meet the planes through points on surfaces; what a medium gives
 // way to, where `soft`, has its own plane and colours.
@@ -124,18 +126,20 @@ ONCE static Surface surface(Job *j, int n, V way, F t, M hit, M soft) {
     float gap = j->stage->gap;
     ask_slots(j, n, way, t + INTO, hit, &r);
     r.t = t;
-    F towards = dot(r.g, way);
-    M left = towards > 0.0f, off = hit & ~soft & (left | (size_of(r.d) > 3 * INTO));  // beyond an edge, or bounds told little
-    if (any(off)) {
-        F there = t + INTO + sel(left, all(-gap), ahead(r.d, towards, gap));
+    for (int last = 0; last < 2; last++) {
+        F towards = dot(r.g, way);
+        M left = towards > 0.0f, off = hit & ~soft & (left | (size_of(r.d) > 3 * INTO));  // of an edge, or bounds said little
+        if (!any(off)) break;
+        M beyond = left & (ints(-last) | (r.d <= 3 * INTO));
+        F there = r.t + INTO + sel(beyond, all(-gap), ahead(r.d, towards, gap));
         ask_slots(j, n, way, there, off, &again);
-        M known = off & (dot(again.g, again.g) > 0.01f) & ~(left & (dot(again.g, way) > 0.0f));  // not past an edge
-        r.t = sel(known, there - INTO, t);
+        M past = (left | (again.d > 3 * INTO)) & (dot(again.g, way) > 0.0f), known = off & (dot(again.g, again.g) > 0.01f) & ~past;
+        r.t = sel(known, there - INTO, r.t);
         r.d = sel(known, again.d, r.d); r.owner = (again.owner & known) | (r.owner & ~known);
         r.g = choose(known, again.g, r.g); r.glow = choose(known, again.glow, r.glow);
         for (int k = 0; k < j->sheets; k++) r.colour[k] = choose(known, again.colour[k], r.colour[k]);
-        towards = dot(r.g, way);
     }
+    F towards = dot(r.g, way);
     r.t = sel(soft, r.t, r.t + INTO + ahead(r.d, towards, gap));
     r.g = scaled(r.g, sel(towards > 0.0f, all(-1), all(1)) / max2(root(dot(r.g, r.g)), all(1e-12f)));
     if (j->means && j->sheets > 1) {

@@ -399,16 +399,18 @@ class Lighting:
         t = xp.take(trail.hit, index)
         result = self.field.near(origin + way * (t + INTO), self.pace.gap, gradient=True, every=True)
         sharp = xp.take(trail.soft, index) == 0
-        left = _dot(result.gradient, way) > 0  # beyond an edge
-        off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
-        if len(off):  # where the distances on both sides of the surface said little about it
-            left, ways = xp.take(left, off), xp.take(way, off)
-            t_off = xp.take(t, off) + INTO
-            t_off = t_off + xp.select(left, 0 * t_off - self.pace.gap, self._ahead(result, way, off))
+        for last in (False, True):  # of an edge, or where the distances said little about the surface
+            left = _dot(result.gradient, way) > 0
+            off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
+            if not len(off):
+                break
+            left, ways, t_off = (xp.take(part, off) for part in (left, way, t))
+            beyond = left & (last | (xp.take(result.distance, off) <= 3 * INTO))
+            t_off = t_off + INTO + xp.select(beyond, 0 * t_off - self.pace.gap, self._ahead(result, way, off))
             begin = origin if origin.shape[1] == 1 else xp.take(origin, off)
             again = self.field.near(begin + ways * t_off, self.pace.gap, gradient=True, every=True)
-            beyond = left & (_dot(again.gradient, ways) > 0)
-            there = xp.where((_dot(again.gradient, again.gradient) > 0.01) & ~beyond)  # not past an edge
+            past = (left | (again.distance > 3 * INTO)) & (_dot(again.gradient, ways) > 0)
+            there = xp.where((_dot(again.gradient, again.gradient) > 0.01) & ~past)
             off = xp.take(off, there)
             xp.put(t, off, xp.take(t_off, there) - INTO)
             for name in ("distance", "register", "gradient", "owner"):
@@ -444,8 +446,9 @@ class Lighting:
         if index is not None:
             d, g, way = xp.take(d, index), xp.take(g, index), xp.take(way, index)
         towards = _dot(g, way)
-        # along a surface, at a cosine over -0.02, the distance says nothing of how far ahead it is
-        return xp.select(towards < -0.02, -d / towards, 0 * d - INTO).clip(-self.pace.gap, self.pace.gap)
+        # along one, at a cosine over -0.02, the distance says nothing of it, but rays met it within the gap
+        along = xp.select(d > 3 * INTO, 0 * d + self.pace.gap, 0 * d - INTO)
+        return xp.select(towards < -0.02, -d / towards, along).clip(-self.pace.gap, self.pace.gap)
 
     def _ground(self, way: Array, t: Array, origin: Array, seen: bool) -> tuple[Array, ...]:
         """As `surface`, of the ground at t (K,), as the eye has seen it or other light meets it."""

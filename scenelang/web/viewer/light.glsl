@@ -120,7 +120,7 @@ void shade(vec3 way, ivec2 list, float px, out vec4 light, out vec4 plain) {
           t -= ahead;
         }
         towards = dot(slope, way);
-        ahead = clamp(towards < -0.02 ? -state / towards : -INTO, -GAP, GAP);
+        ahead = clamp(towards < -0.02 ? -state / towards : state > 3.0 * INTO ? GAP : -INTO, -GAP, GAP);
         if (edge || i == 1 || abs(state) <= 3.0 * INTO) break;
         t += ahead;
       }
