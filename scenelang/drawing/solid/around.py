@@ -58,7 +58,7 @@ CLOSED = 0.02  # of nodes on objects, more of which see nothing but objects in w
 APART, RISE, HIGHEST = 0.02, 0.3, 0.1
 # points along the picture's shorter side and rays of each; where something glows; in hollows, lamps in media
 LATTICE = (52, 12), (96, 16), (96, 32)
-POINT_RAYS, PIXEL_RAYS = 40, 8  # of points without a picture, and of pixels that are asked themselves
+POINT_RAYS, PIXEL_RAYS = 40, 16  # of points without a picture, and of pixels that are asked themselves
 WORTH = 0.5  # of the mean light on the lattice, for which points ask what glows with all their rays
 OFF = 1e-3  # world units off a surface where rays begin
 TURNS = np.array([[0.8130, 0.8931], [0.6199, 0.3014]])  # of rays, by places: a search's least noise
