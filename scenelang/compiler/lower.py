@@ -261,7 +261,15 @@ class _Lowering(Record, frozen=False):
                     help = "a 2D model has no z: leave the third factor out"
                     self.say("W0508", f"{idle} has no effect in the plane", transform, help)
             if isinstance(step, Refusal):
-                self.say(step.code, step.message, transform, step.help)
+                place = self.place(transform)
+                if (
+                    place is not None and "." in place.text
+                ):  # a call of the library, whose own transform it is
+                    self.say(
+                        step.code, f"the arguments of `{place.text}` do not fit: {step.message}", transform
+                    )
+                else:
+                    self.say(step.code, step.message, transform, step.help)
             else:
                 result.append(Move(step, self.place(transform)))
         return tuple(result)

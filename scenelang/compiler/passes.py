@@ -386,7 +386,8 @@ _DIM: Final = 0.1
 
 
 def check_eye(graph: Graph, context: Context) -> Graph:
-    """Report an eye inside an opaque object, and warn of one deep in a medium, by the exact fold there.
+    """Report an eye inside an opaque object, and warn of one deep in a medium and of a lamp that is wholly
+    inside an opaque object, by the exact fold there.
 
     Geometries without a formula count as far away. Before: STREAM. After: unchanged.
     """
@@ -407,6 +408,14 @@ def check_eye(graph: Graph, context: Context) -> Graph:
         fact = f"the eye at [{x:g}, {y:g}, {z:g}] is deep inside this `{holder.geometry}`, a medium"
         help = f"it lets {through:.2g} of the light through at most: move the camera or the object"
         context.diagnostics.add("W0403", fact, holder.span, help=help)
+    lamps = [lamp for lamp in graph.stage.lights if lamp.power]
+    for lamp in lamps if len(lamps) * len(graph.rows()) <= _TESTS else ():
+        depth, holder = _folded(graph.root, lamp.position, graph.space)
+        if depth < -lamp.radius and holder is not None and holder.look.material != "volumetric":
+            at = ", ".join(f"{v:g}" for v in lamp.position)
+            fact = f"the lamp at [{at}] is inside this `{holder.geometry}`, which its light does not leave"
+            help = "move one of them; what shines by itself has `glow(c, power)` in its material"
+            context.diagnostics.add("W0407", fact, holder.span, help=help)
     return graph
 
 

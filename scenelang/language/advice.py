@@ -230,6 +230,10 @@ def _advice(name: tree.Name, place: Site, call: tree.CallExpr | None) -> Advice:
     if help is None and colour is not None:
         fix = Fix(f"write `{colour}`", (Edit(span, colour),))
         return f"colours have no names; {lower} is {colour}", fix
+    if help is None and dotted:
+        files = library.having(re.split(r"\W", source[span.end + 1 : span.end + 80], maxsplit=1)[0])
+        statements = " or ".join(f'import "{file}" as {text};' for file in files or ["…"])
+        return f"what stands before a dot is imported: {statements}", None
     return help or (f"there is {listing(words.FUNCTIONS)}" if call else None), fix
 
 

@@ -283,7 +283,11 @@ def _number_advice(text: str) -> tuple[str, str, str | None]:
     if rest in UNIT_NAMES:
         return message, f"it is `{UNIT_NAMES[rest]}` here", value + UNIT_NAMES[rest]
     if rest in _LENGTHS:
-        return message, "lengths have no unit: the shorter side of the canvas is 2, its middle 0", None
+        return (
+            message,
+            "lengths have no unit; the shorter side of a flat scene's canvas is 2, its middle 0",
+            None,
+        )
     if re.fullmatch("x[0-9]+", rest):
         return message, f"sides are separated by a comma: {value}, {rest[1:]}", None
     units = ", ".join(f"`{unit}`" for unit in UNITS)

@@ -60,6 +60,12 @@ def shapes_of(source: SourceFile) -> Mapping[str, str]:
     return {called(SHAPES): foreign.SHAPES, called(SOLIDS): foreign.SOLIDS}.get(source.name, {})
 
 
+def having(name: str) -> list[str]:
+    """Names of the files of the library with a module of some name."""
+    files = {SHAPES: foreign.SHAPES, SOLIDS: foreign.SOLIDS, "std/letters": {"text": "text(text)"}}
+    return [file for file, calls in files.items() if any(c.startswith(f"{name}(") for c in calls.values())]
+
+
 def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:
     """Help and fix for the path of a file that is not there, if the library's was meant."""
     name = text.removeprefix("./").removesuffix(".nsg").removesuffix(".safetensors")

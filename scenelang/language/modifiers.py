@@ -131,7 +131,10 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "hue": lambda value, at: angle(value, at, "hue"),
     "rate": _rate,
     "factor": _within(
-        bool, "a scale by 0 flattens what it moves", "decimals stand behind a point, as in 0.5", "E0312"
+        bool,
+        "a scale by 0 flattens what it moves",
+        "leave it out, or write a factor other than 0; decimals stand behind a point",
+        "E0312",
     ),
     "growth": _within(lambda r: -0.5 <= r <= 1.0, "a growth of {} is outside -0.5..1", _LEAF.format("r")),
     "wall": _within(lambda w: 0.0 < w <= 1.0, "a wall of {} is not above 0 and at most 1", _LEAF.format("w")),
@@ -329,7 +332,7 @@ def _action(spec: Spec, bound: Sequence[Given | None], stmt: tree.Call, place: S
         if out.moved is None:
             out.moved = span  # even by a transform with a mistake: children have their order all the same
         if node is not None:
-            session.spans.record(node, where)
+            session.spans.record(node, where, session.report.calls)
             session.count_parts(1, span)
             out.transforms.append(node)
             if session.watch is not None:

@@ -373,6 +373,25 @@ def test_light_that_may_be_wrong_is_told_once() -> None:
     assert found.span.locate()[0][0] == 2  # of the 101st object
 
 
+def test_a_lamp_within_an_opaque_object() -> None:
+    """It lights nothing: the picture is that without it."""
+    lamp, camera = "light(position = [0, 0, 0], power = 30);", "camera(eye = [0, 0, 4]); light(none);"
+    balls = {
+        "sphere;": True,
+        "sphere { shell(0.05); }": False,
+        f"sphere {{ {MIST} }}": False,
+        "sphere { translate(0, 2, 0); }": False,
+    }
+    for ball, dark in balls.items():
+        found = [d.code for d in nsg.check_text(camera.replace("light(none);", lamp) + ball)]
+        assert ("W0407" in found) == dark, ball
+    lit, unlit = (
+        np.asarray(draw_exact(nsg.loads(head + "sphere;").sized((8, 8))))
+        for head in (camera.replace("light(none);", lamp), camera)
+    )
+    np.testing.assert_allclose(lit, unlit, atol=1e-6)
+
+
 MIST = "material volumetric { density(0.001); }"
 BALLS = "sphere { scale(0.6); translate(-0.7, 0, 0); } sphere { scale(0.6); translate(0.7, 0, 0); }"
 PAIR = "union { box { scale(0.7); } cone { scale(0.5); translate(1, 0, 0); } }"

@@ -254,6 +254,7 @@ def test_mistakes_in_calls_are_shown_at_the_call() -> None:
         ('s.disc("a");', "E0303", "s.disc"),
         ("s.line([0, 0], 3deg);", "E0303", "s.line"),
         ("s.arc(1, 0.1, 0, 9);", "E0302", "s.arc"),
+        ('import "std/solids" as t; t.prism(2);', "E0312", "t.prism"),
         (f"{NEST.format(level='square {}', inmost='s.disc_mask(1, 8);')} m(16);", "E0409", "s.disc_mask"),
     ):
         found = nsg.Diagnostics()
