@@ -43,8 +43,12 @@ IN F unlike(const Scene *s, const F *a, const F *b) {
 IN void join(const Scene *s, const Cell *c, State *a, const State *x, M in, const int wanted) {
     F take = clamp(c->own[0] * x->d + c->past[0] * a->d + c->bias[0], 0, 1), keep = 1.0f - take;
     F after = take * (x->d * c->candidate - keep * c->bump) + keep * a->d;
-    if (wanted & GRADIENT)
-        a->g = choose(in, plus(scaled(x->g, take * c->candidate), scaled(a->g, keep)), a->g);
+    if (wanted & GRADIENT) {
+        F rate = x->d * c->candidate - a->d - (1.0f - 2.0f * take) * c->bump;
+        rate = sel((take > 0.0f) & (take < 1.0f), rate, all(0));
+        F own = take * c->candidate + rate * c->own[0], past = keep + rate * c->past[0];
+        a->g = choose(in, plus(scaled(x->g, own), scaled(a->g, past)), a->g);
+    }
     if (wanted & (REGISTER_ | OWNER | KIND)) {
         F kind = max2(c->own[3] * x->d + c->past[3] * a->d + c->bias[3], c->own[4] * x->d + c->past[4] * a->d + c->bias[4]);
         M differ = wanted & KIND ? size_of(a->kind - x->kind) > 0.5f : ints(0);

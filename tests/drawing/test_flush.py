@@ -69,3 +69,12 @@ def test_the_earlier_colour_shows_in_a_plane(backend: str) -> None:
     assert not (image[..., 1] > image[..., 0] + 0.1).any()
     opposite = np.asarray(nsg.render(scene(TWO.replace("#f00", "#00f")), backend=backend))
     assert not (opposite[..., 1] > opposite[..., 2] + 0.1).any()
+
+
+def test_seams_are_found_behind_slow_distances() -> None:
+    """Next to a rod a flat block's distance hardly changes along rays, which end before the surface."""
+    text = """nsg 1; import "std/solids" as s; canvas(128, 128); ground(none);
+    camera(eye = [90, 80, 120], target = [15, 5, 10], fov = 16deg);
+    light(position = [60, 160, 140], power = 36000); s.rounded(60, 6, 40, 2) { translate(0, 3, 0); }"""
+    network, formulas = (np.asarray(nsg.render(nsg.loads(text), backend=way)) for way in ("neural", "exact"))
+    assert (abs(network - formulas).max(2) > 3 / 255).sum() <= 3

@@ -10,10 +10,9 @@ last. Two parts are learned:
 2. The cell is an LSTM whose gates are clamped lines in the object's distance and the distance so far, chosen
    by the boolean token. Its register carries colour and medium, the latter under a gate of its own.
 
-Files of weights may also have layers that told the length of half a ray in a leaf; nothing asks them. A
-surface's normal is the gradient of the last distance, written by hand. A gate mixes gradients as distances:
-how fast it opens is left out, as exact gates change nothing where partly open, and learned ones turned
-normals over at seams, where a slow distance and a true one are equal.
+Files of weights may also have layers that told the length of half a ray in a leaf; nothing asks them. Both
+parts say how their answers change with what they are asked, written by hand: a surface's normal is the
+gradient of the distance behind the last object.
 """
 
 from __future__ import annotations
@@ -252,6 +251,13 @@ class SolidNetwork(Lifted):
         paint, kind = xp.largest(gates[1:n]), xp.largest(gates[n:])
         gate = xp.concat([paint] * (len(memory) - 1 - switched) + [kind] * switched, 0)
         return xp.concat([new, memory[1:] + gate * (look - memory[1:])], 0), take
+
+    def partials(self, d: Array, state: Array, take: Array, cell: SolidCell) -> tuple[Array, Array]:
+        """Derivatives (M,) of the distance behind an object by its own and by that before it."""
+        candidate, bump = cell.candidate[0], cell.bump[0]
+        rate = d * candidate - state - (1 - 2 * take) * bump
+        rate = self.xp.select((take > 0) & (take < 1), rate, 0 * rate)
+        return take * candidate + rate * cell.own[0], 1 - take + rate * cell.past[0]
 
 
 class SolidArrays(SolidNetwork):

@@ -387,7 +387,8 @@ class PlainField(SolidField):
             room = xp.minimum(xp.select(differ, room, EMPTY), x[-1])
             rows.append(xp.minimum(before[-1], room)[None])
         if more == 3:
-            rows.append(take * cell.candidate[0] * x[-3:] + (1 - take) * before[-3:])
+            by_own, by_past = self.network.partials(d, before[0], take, cell)
+            rows.append(by_own * x[-3:] + by_past * before[-3:])
         xp.put(state, index, xp.concat(rows, 0))
 
     def _unlike(self, a: Array, b: Array) -> Array:

@@ -56,9 +56,11 @@ void join(int kind_, float narrow, float d, float medium, vec3 g, vec3 rgb, vec3
   int at = kind_ * CELL;
   float before = state, own = d * narrow, past = before * narrow;
   float take = taking(at, own, past), keep = 1.0 - take;
-  vec4 made = cells[at];
-  state = take * (d * made.x - keep * made.y / narrow) + keep * before;
-  slope = take * made.x * g + keep * slope;
+  vec4 made = cells[at], line = cells[at + 1] * narrow;
+  float bump = made.y / narrow;
+  state = take * (d * made.x - keep * bump) + keep * before;
+  float rate = take > 0.0 && take < 1.0 ? d * made.x - before - (1.0 - 2.0 * take) * bump : 0.0;
+  slope = (take * made.x + rate * line.x) * g + (keep + rate * line.y) * slope;
   float gate = painting(at, own, past);
   // on surfaces in one plane the earlier one's material shows, whichever rounding puts in front
   if (kind_ != SMOOTH && abs(d - before) < EQUAL && abs(d) < NEARLY && dense + medium < OTHER) gate = 0.0;
