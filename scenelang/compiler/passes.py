@@ -33,7 +33,7 @@ from scenelang.compiler.graph import (
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.rewrites import Context, cover_of, covered
-from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Light, Space, Stage
+from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space, Stage
 from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span, plural
 from scenelang.language.scene import Scene
@@ -128,18 +128,8 @@ _SUBJECTS = {
 """Codes and subjects of warnings about an object, in the order of the warnings."""
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
-# world units; light of a sky leaks through thinner walls, and more shows in the dark
-THIN_WALL: Final = 0.05
-THIN_CLOSED: Final = 0.09, 0.2
-WAYS: Final = 100  # from the eye, that tell of walls around it,
-WALLS: Final = 0.06  # part of them that a thin wall takes at least,
-OPEN: Final = 0.4  # that may be free,
-BEYOND: Final = 0.1  # that meet a wall again behind another,
-OBLIQUE: Final = 3  # times as long as a wall is thick is a way through it at most,
-SEVERAL: Final = 3  # and walls that are objects of their own: a hollow of one is drawn well
 SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
 CROWD: Final = 100  # objects; light between more of them is less exact
-_SEAM = 1e-3  # world units between walls that touch
 _TOLERANCE = 1e-9
 
 
@@ -182,35 +172,13 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     if "objects" in trained and count > trained["objects"][1]:
         _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
     if graph.stage is not None and graph.stage.sky is not None and context.whole:
-        _check_light(rows, measures, graph, graph.stage, context)
+        _check_light(rows, graph, graph.stage, context)
     return graph
 
 
-def _check_light(
-    rows: list[Row], measures: Callable[[Leaf], Measures], graph: Graph, stage: Stage, context: Context
-) -> None:
-    """Warn once of all that measurements say light under a sky may be wrong of, at the first object.
-
-    Walls count where something opens the hollow, or the eye is in it: closed ones are drawn as solids are.
-    """
+def _check_light(rows: list[Row], graph: Graph, stage: Stage, context: Context) -> None:
+    """Warn once of all that measurements say light under a sky may be wrong of, at the first object."""
     space, found = graph.space, list[tuple[Leaf, str]]()
-    hollow = [row.leaf for row in rows if not row.cuts and Skin.of(row.leaf.steps).shell]
-    walls = [(dict(leaf.noted("measures", measures)).get("wall", inf), leaf) for leaf in hollow]
-    thin = [(thick, leaf) for thick, leaf in walls if thick < THIN_WALL]
-    cuts = [row for row in rows if row.cuts or row.op == "intersect"]
-    for thick, leaf in thin if len(thin) * len(cuts) <= _TESTS else ():
-        box = leaf_box(leaf, 0.0, space)
-        opened = any(not row.cuts or overlap(leaf_box(row.leaf, 0.0, space), box) for row in cuts)
-        if opened or _within(box, stage.camera.eye):
-            fact = f"the wall of this hollow `{leaf.geometry}` is {thick:.3g} thick, and light leaks through"
-            found.append((leaf, f"{fact} what is thinner than {THIN_WALL:g}"))
-            break
-    solid = [(_thick(row.leaf, space), row.leaf) for row in rows if not row.cuts]
-    if not found and sum(thick < THIN_CLOSED[True] for thick, _ in solid) >= SEVERAL:
-        middles = [(steps.composed(leaf.steps)[3::4], leaf) for thick, leaf in solid if thick > THIN_WALL]
-        places = [(stage.camera.eye, None), *middles][: _TESTS // (WAYS * len(rows))]
-        rooms = (_room(graph, stage, at, leaf) for at, leaf in places)
-        found += next(([room] for room in rooms if room is not None), [])
     mist = [row.leaf for row in rows if not row.cuts and row.leaf.look.material == "volumetric"]
     lamps = [lamp for lamp in stage.lights if lamp.radius < SMALL_LAMP and lamp.power]
     for lamp in lamps if len(lamps) * len(rows) <= _TESTS else ():
@@ -230,94 +198,6 @@ def _check_light(
         fact = f"light under a `sky` may be wrong: {'; '.join(fact for _, fact in found)}"
         help = "compare with `render --backend reference`, which traces the light"
         context.diagnostics.add("W0514", fact, min(found, key=lambda at: at[0].number)[0].span, help=help)
-
-
-def _room(graph: Graph, stage: Stage, at: Point, inside: Leaf | None) -> tuple[Leaf, str] | None:
-    """The thinnest wall of a room around the eye, or the middle of what is ``inside``, if light there may be
-    wrong, and what is to say of it. Ways go evenly to all sides; leaves without deformations count as boxes.
-    """
-    walls, free, behind = list[tuple[float, Leaf]](), 0, list[Leaf]()
-    for i in range(WAYS):
-        y, turn = 1 - (2 * i + 1) / WAYS, 2.39996 * i
-        flat = sqrt(1 - y * y)
-        spans = _spans(graph.root, at, (flat * cos(turn), y, flat * sin(turn)))
-        spans = sorted((span for span in spans if span[2] is not inside), key=itemgetter(0))
-        if not spans:
-            free += stage.ground is None or y > 0
-            continue
-        begin, end, wall = spans[0]
-        for a, b, leaf in spans:
-            if a > end + _SEAM:
-                behind.append(leaf)
-                break
-            end = max(end, b)  # as far as one goes on in another
-        thick = _thick(wall, graph.space)
-        walls.append((thick if end - begin < OBLIQUE * thick else inf, wall))
-    # of dark rooms more shows, and floors that go on beyond a wall are lit there
-    own = {id(leaf) for _, leaf in walls}
-    beyond = sum(id(leaf) in own for leaf in behind) >= BEYOND * WAYS
-    lit = inside or free or any(_in_reach(graph, at, lamp) for lamp in stage.lights)
-    limit = THIN_WALL if lit else THIN_CLOSED[beyond]
-    thin = [(thick, leaf) for thick, leaf in walls if thick < limit - _TOLERANCE]
-    if len(thin) < WALLS * WAYS or len({id(leaf) for _, leaf in thin}) < SEVERAL:
-        return None
-    if free > OPEN * WAYS or (inside and not free):  # of what is closed nothing is seen
-        return None
-    thick, wall = min(thin, key=itemgetter(0))
-    around = f"a `{inside.geometry}`" if inside else "the eye"
-    fact = f"this `{wall.geometry}` is a wall around {around}, {thick:.2g} thick, and what is thinner than"
-    return wall, f"{fact} {limit:g} lets light through, or has dark edges"
-
-
-def _thick(leaf: Leaf, space: Space) -> float:
-    """The least thickness of a leaf, inf where that is not known."""
-    row = GEOMETRIES.get(leaf.geometry)
-    return space.stretches(steps.composed(leaf.steps))[0] * row.thickness if row is not None else inf
-
-
-def _in_reach(graph: Graph, eye: Point, lamp: Light) -> bool:
-    """Whether a lamp shines to the eye."""
-    far = dist(eye, lamp.position)
-    x, y, z = ((b - a) / (far or 1.0) for a, b in zip(eye, lamp.position, strict=True))
-    return lamp.power > 0 and all(begin > far for begin, *_ in _spans(graph.root, eye, (x, y, z)))
-
-
-Within = tuple[float, float, Leaf]
-
-
-def _spans(fold: Fold, eye: Point, way: Point) -> list[Within]:
-    """Spans of a ray from the eye within what is opaque of a fold, and their leaves."""
-    found = list[Within]()
-    for link in fold.links:
-        node = link.node
-        own = _spans(node, eye, way) if isinstance(node, Fold) else _span(node, eye, way)
-        if link.op in ("union", "smooth"):
-            found += own
-        elif link.op == "intersect":
-            found = [(max(a, c), min(b, d), leaf) for a, b, leaf in found for c, d, _ in own]
-        for c, d, _ in own if link.op == "subtract" else ():
-            found = [part for a, b, leaf in found for part in ((a, min(b, c), leaf), (max(a, d), b, leaf))]
-        found = [part for part in found if part[0] < part[1]]
-    return found
-
-
-def _span(leaf: Leaf, eye: Point, way: Point) -> list[Within]:
-    row = GEOMETRIES.get(leaf.geometry)
-    if (
-        row is None
-        or leaf.look.material == "volumetric"
-        or not all(isinstance(s, Affine) for s in leaf.steps)
-    ):
-        return []
-    rows = leaf.noted("inverse", lambda leaf: steps.inverted(steps.composed(leaf.steps)))
-    begin, end = 0.0, inf
-    for i, half in enumerate(row.half):
-        a, b, c, at = rows[4 * i : 4 * i + 4]
-        at += a * eye[0] + b * eye[1] + c * eye[2]
-        speed = a * way[0] + b * way[1] + c * way[2] or 1e-12
-        near, far = sorted(((-half - at) / speed, (half - at) / speed))
-        begin, end = max(begin, near), min(end, far)
-    return [(begin, end, leaf)] if begin < end else []
 
 
 def _within(box: Box, p: Point) -> bool:
