@@ -18,7 +18,7 @@ from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, compose
 from scenelang.language import nodes as schema
 from scenelang.language import words
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, Label, Span, listing
-from scenelang.language.library import SpanMap
+from scenelang.language.library import SpanMap, misfit
 from scenelang.language.scene import Brought, Scene
 from scenelang.language.words import SCENES, Combine
 
@@ -262,12 +262,8 @@ class _Lowering(Record, frozen=False):
                     self.say("W0508", f"{idle} has no effect in the plane", transform, help)
             if isinstance(step, Refusal):
                 place = self.place(transform)
-                if (
-                    place is not None and "." in place.text
-                ):  # a call of the library, whose own transform it is
-                    self.say(
-                        step.code, f"the arguments of `{place.text}` do not fit: {step.message}", transform
-                    )
+                if place is not None and "." in place.text:  # where a shape of the library is called
+                    self.say(step.code, misfit(place.text, step.message), transform)
                 else:
                     self.say(step.code, step.message, transform, step.help)
             else:

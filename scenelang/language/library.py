@@ -19,6 +19,8 @@ from scenelang.language.scopes import outwards
 
 SHAPES: Final = "std/shapes"
 SOLIDS: Final = "std/solids"
+_CALLS: Final = {SHAPES: foreign.SHAPES, SOLIDS: foreign.SOLIDS}
+"""How the shapes of each file are called, by many names in small letters."""
 _FOLDER: Final = Path(__file__).resolve().parent / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
 _SUFFIXES: Final = (".nsg", ".safetensors")
@@ -57,13 +59,18 @@ def holds(source: SourceFile) -> bool:
 
 def shapes_of(source: SourceFile) -> Mapping[str, str]:
     """How the shapes of a file of the library are called, by many names in small letters."""
-    return {called(SHAPES): foreign.SHAPES, called(SOLIDS): foreign.SOLIDS}.get(source.name, {})
+    return _CALLS.get(source.name.strip("<>"), {})
 
 
 def having(name: str) -> list[str]:
     """Names of the files of the library with a module of some name."""
-    files = {SHAPES: foreign.SHAPES, SOLIDS: foreign.SOLIDS, "std/letters": {"text": "text(text)"}}
+    files = {**_CALLS, "std/letters": {"text": "text(text)"}}
     return [file for file, calls in files.items() if any(c.startswith(f"{name}(") for c in calls.values())]
+
+
+def misfit(call: str, fact: str) -> str:
+    """The message of a mistake in the library, told where that is called."""
+    return f"the arguments of `{call}` do not fit: {fact}"
 
 
 def meant(text: str, span: Span) -> tuple[str | None, Fix | None]:

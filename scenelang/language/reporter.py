@@ -126,7 +126,7 @@ class Reporter(Record, frozen=False):
         site = calls.outside() if calls is not None and library.holds(span.source) else None
         if site is not None:
             if not code.startswith("E032"):  # a limit of the scene
-                message = f"the arguments of `{site.text}` do not fit: {message}"
+                message = library.misfit(site.text, message)
                 alias, _, name = site.text.rpartition(".")
                 shape = library.shapes_of(span.source).get(name)
                 help = f"it is called {alias}.{shape}" if shape else None

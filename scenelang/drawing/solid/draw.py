@@ -399,7 +399,7 @@ class Lighting:
         t = xp.take(trail.hit, index)
         result = self.field.near(origin + way * (t + INTO), self.pace.gap, gradient=True, every=True)
         sharp = xp.take(trail.soft, index) == 0
-        for last in (False, True):  # of an edge, or where the distances said little about the surface
+        for last in (False, True):  # beside an edge, or where distances said little about the surface
             left = _dot(result.gradient, way) > 0
             off = xp.where(sharp & (left | (abs(result.distance) > 3 * INTO)))
             if not len(off):
