@@ -76,6 +76,7 @@ SOLID_SETS: dict[str, SolidSet] = {
     "wide": SolidSet(canvas=(160, 96)),
     "staged": SolidSet(staged=True),
     "many": SolidSet(objects=(16, 16), media=0.3, size=0.6),
+    "crowd": SolidSet(objects=(100, 100), media=0.3, size=0.35),
     "mixed": SolidSet(objects=(1, 4), warp=WARP, unions=0.4, spread=0.6, staged=True),
     "leaves3d": SolidSet(media=0.3, canvas=(256, 256), leaves=EDGED),
     "gradients": SolidSet(media=0.3, gradients=True, canvas=(256, 256), leaves=(*LEAVES[3],)),
