@@ -28,7 +28,7 @@ from scenelang.drawing.neural.draw import Drawing, Run, draw_objects
 from scenelang.language.scene import Color, Elements, Material, Object, Rotate, Scale, Scene
 
 Drawer = tuple[Literal["numpy", "torch"], str]
-"""The library that draws a picture, and the reason in words."""
+"""The library that draws a picture, and in words what draws, or why it is torch."""
 
 
 def choose_drawer(program: Program, device: Device = "auto", *, exact: bool = False) -> Drawer:
@@ -43,7 +43,7 @@ def choose_drawer(program: Program, device: Device = "auto", *, exact: bool = Fa
         raise RenderError(f"unknown model `{program.model}`") from None
     if renderer not in ("framed", "solid"):
         return "torch", f"a `{renderer}` network is large work for any picture"
-    return ("numpy", "the kernel draws") if there_is_a_kernel() else ("torch", "there is no kernel")
+    return ("numpy", "the kernel") if there_is_a_kernel() else ("torch", "there is no kernel")
 
 
 def draw_small(program: Program, *, exact: bool = False, **run: Unpack[Run]) -> Drawing:

@@ -146,7 +146,7 @@ def test_another_model_of_the_set_may_draw(shipped: Folder, monkeypatch: pytest.
 
 
 def test_solids_are_chosen_for(shipped: Folder) -> None:
-    """And drawn by numpy, by which their times were taken; a cost grows with what the scene shows."""
+    """And drawn without torch, as when their times were taken; a cost grows with what the scene shows."""
     points = [
         point(f"solids3d, {way}", ms, flip, model="solids3d", renderer="solid", samples=way)
         for way, ms, flip in (("draft", 3, 0.015), ("quick", 9, 0.003), ("adaptive", 14, 0.002))
@@ -159,7 +159,7 @@ def test_solids_are_chosen_for(shipped: Folder) -> None:
     for options, samples in (("--max-ms 12", "quick"), ("--max-flip 0.02", "draft")):
         text = said(shipped, options, ball)
         assert f"chosen by the frontier: solids3d, {samples}: " in text
-        assert "drawn by numpy on" in text
+        assert "drawn on one core by the kernel" in text
     mist = shipped.write("mist.nsg", "sphere { scale(1.5); material volumetric; }\n")
     shipped.run("render", mist, "-o", "a.png", "--max-ms", "12", "--max-flip", "0.005", code=2)
 

@@ -175,6 +175,7 @@ def test_what_of_a_drawing_is_not_read_is_said_with_its_lines() -> None:
          "ends drawn round (lines 3, 4, 5, 6, 7 and 2 more)"),
         (f'{rect} fill="oklch(0.7 0.1 50)"/>', "`oklch(0.7 0.1 50)` drawn black (line 2)"),
         (f'<style>g > rect {{ fill: red }}</style>{rect}/>', "the rule of `g > rect` left out (line 2)"),
+        (f'{rect}/>\n<use href="#gone"/>', "a use of `gone`, which is not there, left out (line 3)"),
         ('<rect width="9" height="1em"/><image/>', "the unit of `1em` left out (line 2)"),
     ):  # fmt: skip
         layers, notes = drawn_layers(f'<svg xmlns="http://www.w3.org/2000/svg">\n{body}</svg>'.encode())

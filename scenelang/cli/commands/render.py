@@ -416,7 +416,7 @@ def _draw(job: Input, clock: Clock, progress: Callable[[float], None]) -> Image:
     width, height = program.canvas
     once = width * height - drawing.refined
     job.notes += [
-        f"drawn by {library} on {place}: {why}",
+        f"drawn on {place} by {why if library == 'numpy' else f'torch: {why}'}",
         f"drew {plural(once, 'pixel')} by one sample and {drawing.refined:,} by four",
         f"{plural(drawing.pairs, 'meeting')} of a sample and an object",
     ]

@@ -441,6 +441,7 @@ def _unread(root: Any, data: bytes) -> list[str]:
     reader = expat.ParserCreate()
     reader.StartElementHandler = lambda *_: lines.append(reader.CurrentLineNumber)
     reader.Parse(data, True)
+    names = {element.get("id") for element in root.iter()}
     for element, line in zip(root.iter(), lines, strict=True):
         tag = element.tag.rpartition("}")[2]
         for key, value in element.items():
@@ -457,6 +458,8 @@ def _unread(root: Any, data: bytes) -> list[str]:
                     rule = " ".join(selector.split())[:40]
                     found.setdefault(f"the rule of `{rule}` left out", []).append(line)
         said = [f"{_LOST_TAGS[tag]} left out"] if tag in _LOST_TAGS else []
+        if tag == "use" and _href(element) not in names:
+            said.append(f"a use of `{_href(element)[:40]}`, which is not there, left out")
         declared = [*element.items(), *(pair for text in styles for pair in _STYLED.findall(text))]
         bare = ("stroke", "none") in declared
         for key, value in ((key, value.strip().lower()) for key, value in declared):
@@ -520,7 +523,7 @@ def _simplified(root: Any, svg: Any) -> list[str]:
     seen = _fitted(root, (300.0, 150.0), root.get("viewBox", ""), "", svg)[1]
     views = dict.fromkeys(root, seen)  # the size of what each lies in
     for element, tag in result[1:]:
-        used = named.get(next((v[1:] for k, v in element.attrib.items() if k.endswith("href")), None))
+        used = named.get(_href(element))
         inner = element if tag == "svg" else used if tag == "use" and used is not None else None
         size = views[element]
         if inner is not None and (tag == "svg" or (inner.tag.endswith("symbol") and inner.get("viewBox"))):
@@ -559,8 +562,7 @@ def _drawn(root: Any, named: dict[str, Any]) -> int:
     waiting = [(root, False)]
     while waiting:
         element, counted = waiting.pop()
-        href = next((value for key, value in element.attrib.items() if key.endswith("href")), "")
-        used = named.get(href[1:]) if element.tag.endswith("use") else None
+        used = named.get(_href(element)) if element.tag.endswith("use") else None
         inner = [*element, *([] if used is None else [used])]
         if counted:
             counts[element] = 1 + sum(counts[part] or _MOST_DRAWN for part in inner)
@@ -568,6 +570,11 @@ def _drawn(root: Any, named: dict[str, Any]) -> int:
             counts[element] = 0  # until all in it are
             waiting += [(element, True), *((part, False) for part in inner)]
     return counts[root]
+
+
+def _href(element: Any) -> str:
+    """The name that an element refers to, or an empty text."""
+    return next((value[1:] for key, value in element.attrib.items() if key.endswith("href")), "")
 
 
 def _opacity(element: Any) -> float:
@@ -588,10 +595,9 @@ def _mean(gradient: Any, named: dict[str, Any], svg: Any) -> str:
     """The mean colour of a gradient, which may have the stops of another."""
     for _ in range(9):
         stops = [child for child in gradient if child.tag.endswith("stop")]
-        href = next((value for key, value in gradient.attrib.items() if key.endswith("href")), "")
-        if stops or href[1:] not in named:
+        if stops or _href(gradient) not in named:
             break
-        gradient = named[href[1:]]
+        gradient = named[_href(gradient)]
     rows = []
     for stop in stops:
         style = dict(part.split(":", 1) for part in stop.get("style", "").split(";") if ":" in part)
