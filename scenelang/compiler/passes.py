@@ -21,7 +21,6 @@ from scenelang.compiler.graph import (
     Invariant,
     Leaf,
     Link,
-    Row,
     Sound,
     leaf_box,
     leaves,
@@ -33,7 +32,7 @@ from scenelang.compiler.graph import (
 from scenelang.compiler.lower import Memory, Spans, lower
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.rewrites import Context, cover_of, covered
-from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space, Stage
+from scenelang.compiler.spaces import EXTINCTION, REACH, Box, Space
 from scenelang.compiler.steps import Affine, Skin, Step
 from scenelang.language.diagnostics import Diagnostics, Label, Span, plural
 from scenelang.language.scene import Scene
@@ -129,7 +128,6 @@ _SUBJECTS = {
 _WRONG = "twirl", "bend", "twist", "displace", "frequency", "scale", "thin"
 WILD = 100  # times the largest measured value of these pictures may be wrong all over
 SMALL_LAMP: Final = 0.03  # world units; the light of lamps of a smaller radius is less exact in mist
-CROWD: Final = 100  # objects; light between more of them is less exact
 _TOLERANCE = 1e-9
 
 
@@ -171,38 +169,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     count = sum(leaf.geometry not in letters for _, leaf, *_ in rows)
     if "objects" in trained and count > trained["objects"][1]:
         _warn(context, "W0501", "objects", f"{count:,} objects are", rows[-1].leaf)
-    if graph.stage is not None and graph.stage.sky is not None and context.whole:
-        _check_light(rows, graph, graph.stage, context)
     return graph
-
-
-def _check_light(rows: list[Row], graph: Graph, stage: Stage, context: Context) -> None:
-    """Warn once of all that measurements say light under a sky may be wrong of, at the first object."""
-    space, found = graph.space, list[tuple[Leaf, str]]()
-    mist = [row.leaf for row in rows if not row.cuts and row.leaf.look.material == "volumetric"]
-    lamps = [lamp for lamp in stage.lights if lamp.radius < SMALL_LAMP and lamp.power]
-    for lamp in lamps if len(lamps) * len(rows) <= _TESTS else ():
-        if not (boxed := [leaf for leaf in mist if _within(leaf_box(leaf, 0.0, space), lamp.position)]):
-            continue
-        depth, holder = _folded(graph.root, lamp.position, space)
-        if depth >= 0.0:
-            holder = next((leaf for leaf in boxed if leaf.geometry not in GEOMETRIES), None)
-        if holder is not None and holder.look.material == "volumetric":
-            at = ", ".join(f"{v:g}" for v in lamp.position)
-            fact = f"the lamp at [{at}] is in the mist of this `{holder.geometry}`, and its radius of "
-            found.append((holder, f"{fact}{lamp.radius:g} is below {SMALL_LAMP:g}"))
-            break
-    if len(rows) > CROWD:
-        found.append((rows[CROWD].leaf, f"there are {len(rows):,} objects, and it was measured to {CROWD}"))
-    if found:
-        fact = f"light under a `sky` may be wrong: {'; '.join(fact for _, fact in found)}"
-        help = "compare with `render --backend reference`, which traces the light"
-        context.diagnostics.add("W0514", fact, min(found, key=lambda at: at[0].number)[0].span, help=help)
-
-
-def _within(box: Box, p: Point) -> bool:
-    x, y, z = p
-    return overlap(box, (x, y, x, y, z, z))
 
 
 def _measures(leaf: Leaf, space: Space) -> Measures:
@@ -266,8 +233,8 @@ _DIM: Final = 0.1
 
 
 def check_eye(graph: Graph, context: Context) -> Graph:
-    """Report an eye inside an opaque object, and warn of one deep in a medium and of a lamp that is wholly
-    inside an opaque object, by the exact fold there.
+    """Report an eye inside an opaque object, and warn of one deep in a medium, of a lamp that is wholly
+    inside an opaque object and, under a sky, of a tiny one in a medium, by the exact fold there.
 
     Geometries without a formula count as far away. Before: STREAM. After: unchanged.
     """
@@ -291,11 +258,19 @@ def check_eye(graph: Graph, context: Context) -> Graph:
     lamps = [lamp for lamp in graph.stage.lights if lamp.power]
     for lamp in lamps if len(lamps) * len(graph.rows()) <= _TESTS else ():
         depth, holder = _folded(graph.root, lamp.position, graph.space)
-        if depth < -lamp.radius and holder is not None and holder.look.material != "volumetric":
-            at = ", ".join(f"{v:g}" for v in lamp.position)
+        if depth >= 0.0 or holder is None:
+            continue
+        at = ", ".join(f"{v:g}" for v in lamp.position)
+        mist = holder.look.material == "volumetric"
+        if not mist and depth < -lamp.radius:
             fact = f"the lamp at [{at}] is inside this `{holder.geometry}`, which its light does not leave"
             help = "move one of them; what shines by itself has `glow(c, power)` in its material"
             context.diagnostics.add("W0407", fact, holder.span, help=help)
+        elif mist and lamp.radius < SMALL_LAMP and graph.stage.sky is not None:
+            fact = f"light under a `sky` may be wrong: the lamp at [{at}] is in the mist of this "
+            fact += f"`{holder.geometry}`, and its radius of {lamp.radius:g} is below {SMALL_LAMP:g}"
+            help = "compare with `render --backend reference`, which traces the light"
+            context.diagnostics.add("W0514", fact, holder.span, help=help)
     return graph
 
 
