@@ -316,8 +316,8 @@ def frontier(
 ) -> None:
     """Measure time and error of every way to draw the scenes of MODEL's set, side by side, in one run.
 
-    That is all shipped models of the set, with and without skipping and with other samplings, the exact
-    field in the network's place with all that the renderer skips, the exact reference, and the time of the
+    That is all shipped models of the set, also with other samplings, the exact field by formulas in the
+    network's place, in the same kernel, the exact reference, and the time of the
     paper's streaming renderer at full size. Writes frontier.json, frontier.png and frontier.html, which needs
     no other file, into FOLDER.
 

@@ -14,8 +14,8 @@ from scenelang.drawing.solid.norms import FEATURES, LINES
 PLANE = (
     "shapes2d",
     "exact field",
-    "shapes2d, nothing skipped, four samples",
-    "exact field, nothing skipped, four samples",
+    "shapes2d, four samples",
+    "exact field, four samples",
     "shapes2d, one sample",
     "exact field, one sample",
     "Skia",

@@ -31,8 +31,6 @@ COLOURS: Final = {
 MARKS: Final = {
     "adaptive": ("o", "four samples near outlines"),
     "four": ("s", "four samples everywhere"),
-    "unskipped": ("v", "nothing skipped, four samples near outlines"),
-    "unskipped four": ("P", "nothing skipped, four samples everywhere"),
     "one": ("^", "one sample a pixel"),
     "quick": ("D", "four samples near strong outlines, longer steps"),
     "draft": ("<", "one sample for four pixels, enlarged"),
@@ -132,8 +130,6 @@ def _chart(
 
 def mark_of(point: Point) -> str:
     """The entry of `MARKS` for a point."""
-    if point.renderer in ("framed", "exact field") and not point.skip:
-        return "unskipped four" if point.samples == "four" else "unskipped"
     return str(point.samples)
 
 

@@ -19,7 +19,6 @@ from scenelang.drawing.exact.picture import reference_image
 from scenelang.drawing.how import Sampling
 from scenelang.drawing.image import Image, from_samples
 from scenelang.drawing.neural.draw import draw_objects
-from scenelang.drawing.neural.files import load_arrays
 from scenelang.drawing.neural.paper import Streaming, StreamingConfig
 from scenelang.drawing.small import choose_drawer, draw_small
 from scenelang.drawing.torch_backend import draw_program, open_model
@@ -34,7 +33,6 @@ TITLES: dict[Sampling, str] = {
     "draft": ", draft",
     "quick": ", quick",
 }
-UNSKIPPED: tuple[Sampling, ...] = ("adaptive", "four")
 FIELD, REFERENCE, PAPER = "exact field", "exact reference", "the paper's streaming"
 Draw = Callable[[], Image]
 Prepare = Callable[[Scene], Draw]
@@ -110,26 +108,15 @@ def _of_model(manifest: Manifest, base: str, threads: int) -> Iterator[Way]:
         yield way(name + TITLES[samples], samples=samples)
     if name != base:
         return
-    for samples in UNSKIPPED if manifest.renderer == "framed" else ():
-        yield way(
-            f"{name}, nothing skipped{TITLES[samples]}",
-            "drawn for comparison: without one of the savings",
-            samples=samples,
-            skip=False,
-        )
-    fields: list[tuple[Sampling, bool]] = [
-        (samples, True) for samples in known.get(manifest.renderer, ()) if samples != "draft"
-    ]
-    fields += [(samples, False) for samples in UNSKIPPED] if manifest.renderer == "framed" else []
-    for samples, skip in fields:
-        yield Way(
-            f"{FIELD}{'' if skip else ', nothing skipped'}{TITLES[samples]}",
-            _formulas(name, threads, samples, skip),
-            renderer=FIELD,
-            samples=samples,
-            skip=skip,
-            why_not="formulas in place of the network, all else alike",
-        )
+    for samples in known.get(manifest.renderer, ()):
+        if samples != "draft":
+            yield Way(
+                FIELD + TITLES[samples],
+                _formulas(name, threads, samples),
+                renderer=FIELD,
+                samples=samples,
+                why_not="formulas in place of the network, all else alike",
+            )
 
 
 def _neural(name: str, side: int, threads: int, samples: Sampling = "adaptive", skip: bool = True) -> Prepare:
@@ -144,26 +131,25 @@ def _neural(name: str, side: int, threads: int, samples: Sampling = "adaptive", 
             return lambda: (
                 draw_program(program, model, threads=threads, samples=samples, skip=skip, patient=True).image
             )
-        if skip:
-            return lambda: draw_small(program, threads=threads, samples=samples).image
-        return lambda: draw_objects(load_arrays(name).network, program, samples=samples, skip=skip).image
+        return lambda: draw_small(program, threads=threads, samples=samples).image
 
     return prepare
 
 
-def _formulas(name: str, threads: int, samples: Sampling, skip: bool) -> Prepare:
+def _formulas(name: str, threads: int, samples: Sampling) -> Prepare:
     def prepare(scene: Scene) -> Draw:
         program, field = compile_scene(scene, model=name), closed_forms(name)
-        return lambda: draw_objects(field, program, threads=threads, samples=samples, skip=skip).image
+        return lambda: draw_objects(field, program, threads=threads, samples=samples).image
 
     return prepare
 
 
 def paired(base: str) -> list[tuple[str, str]]:
     """Pairs of ways, the slower first, whose times are told as a ratio."""
-    savings = ["", TITLES["four"], ", nothing skipped", f", nothing skipped{TITLES['four']}"]
-    pairs = [(base + saved, FIELD + saved) for saved in [*savings, TITLES["one"], TITLES["quick"]]]
-    pairs += [(name + saved, name) for name in (base, FIELD) for saved in savings[1:]]
+    pairs = [
+        (base + TITLES[samples], FIELD + TITLES[samples]) for samples in ("adaptive", "four", "one", "quick")
+    ]
+    pairs += [(name + TITLES["four"], name) for name in (base, FIELD)]
     others = f"{PAPER}, {FULL}²", f"{REFERENCE}, 4 spp"
     return pairs + [(other, name) for other in others for name in (base, FIELD)]
 
