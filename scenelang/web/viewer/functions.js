@@ -75,6 +75,24 @@ function lengthOf(value) {
   return typeof value === "string" ? [...value].length : refuse(`${kindOf(value)} has no length`);
 }
 
+const MOST_PLACES = 15;
+
+/** A number, a boolean or a string as text, as `values.text_of` in scenelang/language writes it. */
+function textOf(value, digits) {
+  if (digits !== undefined) return rounding(bare(value), bare(digits));
+  if (typeof value === "string" || typeof value === "boolean") return String(value);
+  const size = Math.abs(bare(value));
+  return size > 0 && (size < 1e-4 || size >= 1e16) ? value.toExponential().replace("e+", "e") : String(value);
+}
+
+function rounding(x, places) {
+  if (!Number.isInteger(places) || places < 0 || places > MOST_PLACES) refuse(`${places} digits of a number`);
+  const size = Math.abs(x);
+  const zeros = places > 0 ? `.${"0".repeat(places)}` : "";
+  const text = size < 1e21 ? size.toFixed(places) : BigInt(size) + zeros; // from there on toFixed has exponents
+  return x < 0 && /[1-9]/.test(text) ? `-${text}` : text;
+}
+
 const MASK_64 = (1n << 64n) - 1n;
 const BITS_OF_SEED = new DataView(new ArrayBuffer(8));
 
@@ -130,6 +148,7 @@ export const FUNCTIONS = {
   mix: mixed,
   smoothstep: smoothed,
   len: lengthOf,
+  str: textOf,
   rand: randomOf,
   rgb: (...parts) => new Vec(parts.map(bare)),
   hsv: hsvColour,
