@@ -17,6 +17,7 @@ from typing import Any, Final, Literal
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import plural
 from scenelang.language.nodes import Material
+from scenelang.language.noise import noise
 
 MAX_VECTOR: Final = 1_000_000  # numbers in one vector, nested ones counted
 MAX_VECTOR_DEPTH: Final = 16
@@ -577,6 +578,17 @@ def rand(seed: Any) -> float:
     return (state >> 11) / (1 << 53)
 
 
+def _noise(v: Any, seed: Any = 0.0) -> float:
+    point = v.items if v.__class__ is Vec else (v,)
+    if not 0 < len(point) <= 3:
+        raise unexpected("a number or a vector of 1 to 3", v, operand=0)
+    whole = number(seed, 1)
+    if not whole.is_integer():
+        raise Problem("E0305", f"expected a whole number, found {show(whole)}", operand=1)
+    x, y, z = (*map(number, point), 0.0, 0.0)[:3]
+    return noise(x, y, z, int(whole))
+
+
 def _hsv(h: Any, s: Any, v: Any) -> Vec:
     turns = h.size / math.tau if h.__class__ is Angle else number(h, 0)
     return Vec(colorsys.hsv_to_rgb(turns % 1.0, number(s, 1), number(v, 2)))
@@ -604,6 +616,7 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "len": _len,
     "str": text_of,
     "rand": rand,
+    "noise": _noise,
     "rgb": lambda *components: Vec(tuple([number(c, i) for i, c in enumerate(components)])),
     "hsv": _hsv,
 }

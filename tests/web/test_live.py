@@ -483,6 +483,8 @@ def test_random_expressions(viewer_page: Any) -> None:
         for x in (10.0 ** pick.uniform(-9, 23) * pick.choice([-1, 1]) for _ in range(200))
         for digits in ("", f", {pick.randint(0, 15)}")
     ]
+    spots = [[pick.uniform(-9, 9) * 10.0 ** pick.randint(0, 8) for _ in range(n % 3 + 1)] for n in range(200)]
+    texts += [f"noise({spot}, seed = {pick.randint(-9, 2**40)})" for spot in spots]
     texts += [f"str({n / 16}, {n % 5})" for n in range(-99, 99)]
     made = [(text, *pair) for text in texts if (pair := evaluated(text)) is not None]
     shown = viewer_page.evaluate(VALUES, [form for _, _, form in made])
