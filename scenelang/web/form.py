@@ -546,7 +546,7 @@ def form_of(
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
     usual, fields = {**stage_data(Stage()), "sky": stage_data(Sky())}, {}
-    usual["light"]["radius"], usual["ground"]["fade"] = 0.0, FADE
+    usual["light"]["radius"], usual["ground"]["fade"], usual["camera"]["exposure"] = 0.0, FADE, 1.0
     for name, word in words.STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         least = [one.get("minimum", one.get("exclusiveMinimum", -MOST)) for one in schema]
