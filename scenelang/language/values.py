@@ -545,8 +545,8 @@ def text_of(value: Any, digits: Any = None) -> str:
         return "true" if value else "false"
     if value.__class__ not in UNITS:
         raise unexpected("a number, a boolean or a string", value, operand=0)
-    digits, e, exponent = repr(number(value) + 0.0).partition("e")  # + 0.0 makes -0 a 0
-    return digits.removesuffix(".0") + (f"e{int(exponent)}" if e else "")
+    shown, e, exponent = repr(number(value) + 0.0).partition("e")  # + 0.0 makes -0 a 0
+    return shown.removesuffix(".0") + (f"e{int(exponent)}" if e else "")
 
 
 def _rounded(x: float, places: float) -> str:
