@@ -104,7 +104,7 @@ static void written(Job *j, const F *sum, int n, const size_t *at, float *out) {
     int channels = j->stage->transparent ? 4 : 3;
     F value[4], whole = max2(sum[3], all(1e-6f)), wrong = all(0);
     for (int d = 0; d < 3; d++) {
-        F x = channels == 4 ? sum[d] / whole : sum[d];
+        F x = j->stage->exposure * (channels == 4 ? sum[d] / whole : sum[d]);
         wrong += x - x;
         x = clamp(x, 0, 1);
         F power = exponential(logarithm(max2(x, all(1e-9f))) * (1 / 2.4f));  // IEC 61966-2-1
@@ -129,7 +129,7 @@ static int uneven(const Stage *e, const float *picture, size_t plane, int from, 
             int begin = x + (k > 2) * (2 * k - 7);
             if (inside) v[k] = load(of, begin);
             else for (int w = 0; w < W; w++) v[k][w] = of[begin + w < 0 ? 0 : begin + w > last ? last : begin + w];
-            v[k] = root(clamp(v[k], 0, 1));
+            v[k] = root(clamp(row == 3 ? v[k] : v[k] * e->exposure, 0, 1));  // of 3, alpha
         }
         most = greatest(most, size_of(v[3] + v[4] - 2.0f * v[0]), size_of(v[1] + v[2] - 2.0f * v[0]));
     }

@@ -57,8 +57,8 @@ typedef struct {
 typedef struct { float at[3], power[3], radius; } Lamp;  // 0 of a point; power times colour
 typedef struct {
     double forward[3], right[3], up[3], px;  // of the camera, of a picture that is 2 wide where `forward` ends; a pixel's side
-    float eye[3], horizon[3], zenith[3], ground[3], floor, gap, ambient[2], fade, nearest, lift, contrast, deep[3];
-    // `deep` tells how wide that picture's half is at a point
+    float eye[3], horizon[3], zenith[3], ground[3], floor, gap, ambient[2], fade, nearest, lift, contrast, deep[3], exposure;
+    // `deep` tells how wide that picture's half is at a point; all light counts times `exposure` where it is encoded
     int32_t lamps, grounded, transparent, glow;  // `glow`: the first row of the register that tells it, 0 for none
     int32_t width, height, count, every, nodes;  // samples of a pixel that differs, or of every one; nodes of a way in a medium
     const Lamp *lamp;

@@ -102,12 +102,13 @@ def measure(
             began = time.perf_counter()
             image = render(program, threads=threads)
             row["seconds"] = time.perf_counter() - began
-            exact = over_white(from_light(truth.mean, program.background is None))
+            exposure = program.stage.camera.exposure if program.stage else 1.0
+            exact = over_white(from_light(truth.mean, program.background is None, exposure))
             picture = over_white(image)
             row |= {"psnr": psnr(picture, exact), "flip": flip(picture, exact)}
             # what a renderer without error would have, if the traced picture's noise were Gaussian
             noise = np.random.default_rng(seed).standard_normal(truth.mean.shape) * truth.error
-            noisy = over_white(from_light(truth.mean + noise, program.background is None))
+            noisy = over_white(from_light(truth.mean + noise, program.background is None, exposure))
             row["own_flip"] = flip(noisy, exact)
             # squares of errors add, so twice the noise tells how much of it is in FLIP
             square = 2 * row["flip"] ** 2 - flip(picture, noisy) ** 2

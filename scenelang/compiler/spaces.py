@@ -75,11 +75,18 @@ def encoded(linear: Triple) -> Triple:
 
 
 class Camera(Record):
-    """The camera: world points, and the angle of view, in (0, pi), across the canvas's shorter side."""
+    """The camera: world points, and the angle of view, in (0, pi), across the canvas's shorter side.
+
+    All light is multiplied by ``exposure`` before it is clamped and encoded.
+    """
 
     eye: Triple = (0.0, 1.2, 6.0)
     target: Triple = (0.0, 0.0, 0.0)
     fov_rad: float = 2.0 * atan(1.0 / 3.0)
+    exposure: float = 1.0
+
+    def __repr__(self) -> str:
+        return _said(self)
 
     def axes(self) -> tuple[Triple, Triple, Triple]:
         """Unit vectors forward, right and up; seen straight along y, up is -z."""
@@ -175,6 +182,7 @@ class Stage(Record):
         """Say why it shows nothing, None where it does."""
         camera = camera_fault(self.camera.eye, self.camera.target, self.camera.fov_rad)
         faults = [] if camera is None else [camera[1]]
+        faults += [] if self.camera.exposure > 0.0 else [f"an exposure of {self.camera.exposure:g}"]
         faults += [f"more than {LAMPS} lights"] if len(self.lights) > LAMPS else []
         faults += [f"a radius of {light.radius:g} is negative" for light in self.lights if light.radius < 0.0]
         powers = [light.power for light in self.lights] + ([self.sky.power] if self.sky else [])
@@ -193,6 +201,8 @@ def _fields(part: Record) -> dict[str, Any]:
         del fields["radius"]
     if isinstance(part, Ground) and part.fade == FADE:
         del fields["fade"]
+    if isinstance(part, Camera) and part.exposure == 1.0:
+        del fields["exposure"]
     if isinstance(part, Stage) and part.plain:
         del fields["sky"]
         (light,) = part.lights
@@ -233,7 +243,9 @@ def _read(usual: Any, value: Any, name: str) -> Any:
     usual = Sky() if name == "sky" else usual
     if isinstance(usual, Record):
         names: tuple[str, ...] = usual.__match_args__
-        if isinstance(usual, Light | Ground) and isinstance(value, dict):  # what was not there at first
+        if isinstance(usual, Light | Ground | Camera) and isinstance(
+            value, dict
+        ):  # what was not there at first
             value = {names[-1]: getattr(usual, names[-1]), **value}
         if not isinstance(value, dict) or value.keys() != set(names):
             raise ValueError(f"`{name}` has fields missing or unknown")
@@ -252,7 +264,7 @@ def stage_of(scene: Scene) -> Stage:
     camera, ground, backdrop = Camera(), scene.ground, scene.background
     lights: tuple[Light, ...] = (Light(),)
     if scene.camera != "default":
-        camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov)
+        camera = Camera(scene.camera.eye, scene.camera.target, scene.camera.fov, scene.camera.exposure)
     if scene.light != "default":
         written = scene.light if isinstance(scene.light, tuple) else (scene.light,)
         lamps = [lamp for lamp in written if lamp is not None]

@@ -367,9 +367,9 @@ def from_samples(colour: npt.NDArray[Any], alpha: npt.NDArray[Any] | None) -> Im
     return image
 
 
-def from_light(picture: npt.NDArray[Any], transparent: bool) -> Image:
-    """An image of premultiplied linear light and alpha (4, H, W)."""
-    light, alpha = np.moveaxis(picture[:3], 0, 2), picture[3]
+def from_light(picture: npt.NDArray[Any], transparent: bool, exposure: float = 1.0) -> Image:
+    """An image of premultiplied linear light, times ``exposure``, and alpha (4, H, W)."""
+    light, alpha = exposure * np.moveaxis(picture[:3], 0, 2), picture[3]
     if not transparent:
         return from_samples(encoded(light), None)
     return from_samples(encoded(light / np.maximum(alpha, 1e-6)[..., None]) * alpha[..., None], alpha)

@@ -78,6 +78,7 @@ LAMP = dtype_of("f4 at[3] power[3] radius")
 STAGE = dtype_of(
     "f8 forward[3] right[3] up[3] px",
     "f4 eye[3] horizon[3] zenith[3] ground[3] floor gap ambient[2] fade nearest lift contrast deep[3]",
+    "f4 exposure",
     "i4 lamps grounded transparent glow width height count every nodes",
     "u8 lamp opaque hazy",
 )
@@ -415,7 +416,7 @@ def stage_rows(
     result["gap"], result["ambient"] = pace.gap, AMBIENT
     result["contrast"], result["nodes"], result["glow"] = pace.contrast, pace.nodes, glow
     result["nearest"], result["lift"], result["transparent"] = NEAREST, LIFT, stage.transparent
-    result["width"], result["height"] = canvas
+    (result["width"], result["height"]), result["exposure"] = canvas, camera.exposure
     result["count"], result["every"] = samples, every
     result["lamps"], result["lamp"] = len(lamps), lamps.ctypes.data
     for name, tables in zip(("opaque", "hazy"), shadows, strict=False):

@@ -168,7 +168,8 @@ def stage_text(stage: Stage | None) -> list[str]:
     ]
     seen = "sky" if stage.horizon != stage.zenith else colour(stage.horizon)
     return [
-        f"camera({point(camera.eye)}, {point(camera.target)}, {degrees(camera.fov_rad):g}deg)",
+        f"camera({point(camera.eye)}, {point(camera.target)}, {degrees(camera.fov_rad):g}deg"
+        + (")" if camera.exposure == 1.0 else f", exposure = {camera.exposure:g})"),
         *(lamps or ["light(none)"]),
         f"ground({'none' if ground is None else f'{ground.y:g}, {colour(ground.rgb)}'})",
         *([] if sky is None else [f"sky({sky.power:g}, {colour(sky.horizon)}, {colour(sky.zenith)})"]),

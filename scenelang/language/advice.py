@@ -26,6 +26,9 @@ def problem_advice(problem: Problem, operand: tree.Expr | None) -> Advice:
         if operand is None or colour is None:
             return problem.help, None
         return problem.help, Fix(f"write `{colour}`", (Edit(operand.span, colour),))
+    if problem.fix == "text" and operand is not None:
+        written = f"str({operand.span.text})"
+        return problem.help, Fix(f"write `{written}`", (Edit(operand.span, written),))
     inner = operand.operand if isinstance(operand, tree.Unary) else operand
     if isinstance(inner, tree.NumberLiteral):
         size, end = abs(inner.value), inner.span.end

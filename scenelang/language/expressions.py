@@ -13,7 +13,14 @@ from scenelang.language.advice import member_advice, report_problem, unknown, un
 from scenelang.language.builder import FileContext, Site
 from scenelang.language.diagnostics import Label, Span, did_you_mean, instead, listing
 from scenelang.language.library import Calls
-from scenelang.language.limits import GENERAL_STEPS, HALF_STEPS, ITEM_STEPS, MAX_DEPTH, MAX_NESTING
+from scenelang.language.limits import (
+    GENERAL_STEPS,
+    HALF_STEPS,
+    ITEM_STEPS,
+    LETTERS_AS_ITEM,
+    MAX_DEPTH,
+    MAX_NESTING,
+)
 from scenelang.language.reporter import Reporter
 from scenelang.language.scopes import VALUES
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs
@@ -24,7 +31,7 @@ Run = Callable[[Env], Any]
 
 VARIES: Final = object()
 """Marks an expression whose value is known only when it runs."""
-_FOLDED_NUMBERS: Final = 64
+_FOLDED: Final = 64  # numbers or letters
 
 
 class Code(NamedTuple):
@@ -100,12 +107,19 @@ def folded(codes: Iterable[Code], function: Callable[..., Any], run: Run) -> Cod
     values = [code.value for code in codes]
     if VARIES in values or POISON in values:
         return Code(run)
-    if any(value.__class__ is Vec and value.count > _FOLDED_NUMBERS for value in values):
+    if any(_size(value) > _FOLDED for value in values):
         return Code(run)  # work that counts as evaluation steps
     try:
         return constant(function(*values))
     except Problem:
         return Code(run)  # reported when and if it runs
+
+
+def _size(value: Any) -> int:
+    """How many numbers a vector has, or a string counts as; 0 for what takes no longer than a number."""
+    if value.__class__ is Vec:
+        return int(value.count)
+    return len(value) // LETTERS_AS_ITEM if value.__class__ is str else 0
 
 
 def guarded(
@@ -123,8 +137,8 @@ def guarded(
         for value in values:
             if value is POISON:
                 return POISON
-            if value.__class__ is Vec:
-                session.tick(item_steps * value.count, span)
+            if value.__class__ is Vec or value.__class__ is str:
+                session.tick(item_steps * _size(value), span)
         try:
             return function(*values)
         except Problem as problem:
@@ -244,6 +258,7 @@ _FAST: Final[dict[str, Callable[[Any, Any], Any]]] = {
 """Operators on two numbers, unless the result is an error or not finite."""
 _MEANINGS: Final[dict[str, Callable[[Any, Any], Any]]] = {
     **{op: partial(values.binary, op) for op in values.ARITHMETIC},
+    "+": values.add,
     **{op: partial(values.compare, op) for op in values.COMPARE},
     "==": values.equal,
     "!=": lambda a, b: not values.equal(a, b),

@@ -41,9 +41,11 @@ MATERIAL_VALUE: Final = 8
 CALL_STEPS: Final = 4
 GENERAL_STEPS: Final = 5
 """An operation on anything but two numbers."""
-FUNCTIONS: Final = {"hsv": 20, "mix": 12, "clamp": 8, "smoothstep": 8}
+FUNCTIONS: Final = {"hsv": 20, "mix": 12, "clamp": 8, "smoothstep": 8, "str": 12, "noise": 200}
 """Half steps of functions that take longer than most."""
 ITEM_STEPS: Final = 4
 """An operator on one number of a vector."""
+LETTERS_AS_ITEM: Final = 16
+"""How many letters of a string count as a number of a vector."""
 FUNCTION_ITEM_STEPS: Final = 5
 """A function of the language on one number of a vector."""

@@ -147,6 +147,7 @@ KINDS: Final[dict[str, Callable[[Any, int], Any]]] = {
     "side": lambda value, at: int(_side(value, at)),
     "share": _within(lambda share: 0.0 <= share <= 1.0, "an opacity of {} is outside 0..1"),
     "power": _power,
+    "exposure": _within(lambda times: times > 0.0, "an exposure of {} is not above 0"),
     "distance": _within(lambda far: far > 0.0, "a distance of {} is not positive"),
     "extent": _within(lambda radius: radius >= 0.0, "a radius of {} is negative"),
     "density": _within(

@@ -450,11 +450,14 @@ EITHER = Discriminator(lambda value: "unsaid" if isinstance(value, str) else "st
 
 
 class Camera(Frozen):
-    """Viewpoint of a 3D scene; ``fov`` is the angle of view in radians across the shorter side."""
+    """Viewpoint of a 3D scene; ``fov`` is the angle of view in radians across the shorter side, ``exposure``
+    what all light is multiplied by before it is clamped and encoded.
+    """
 
     eye: Point = (0.0, 1.2, 6.0)
     target: Point = (0.0, 0.0, 0.0)
     fov: Annotated[Radians, Field(gt=0, lt=pi)] = Field(default=2.0 * atan(1.0 / 3.0), kw_only=True)
+    exposure: Annotated[Finite, Field(gt=0, le=MOST)] = Field(default=1.0, kw_only=True)
 
     @classmethod
     def _arranged(cls, args: tuple[Any, ...], data: dict[str, Any]) -> dict[str, Any]:

@@ -454,9 +454,6 @@ def _is_literal(expr: tree.Expr) -> bool:
             return False
 
 
-MAX_TEXT: Final = 10_000  # characters
-
-
 class Letters(NamedTuple):
     """A font and the name that a Scene has its file by."""
 
@@ -470,9 +467,9 @@ def _line(font: Font, text: Any, size: Any) -> tuple[list[Placed], float]:
         raise values.unexpected("a string", text, operand=0)
     if values.number(size, 1) <= 0.0:
         raise Problem("E0311", f"a size of {values.show(size)} is not above 0", operand=1)
-    if len(text) > MAX_TEXT:
+    if len(text) > values.MAX_TEXT:
         help = "write it as several texts, as one is a line"
-        raise Problem("E0370", f"a text of more than {MAX_TEXT:,} characters", help, operand=0)
+        raise Problem("E0370", f"a text of more than {values.MAX_TEXT:,} characters", help, operand=0)
     try:
         return font.line(text)
     except FontError as error:

@@ -17,9 +17,12 @@ from typing import Any, Final, Literal
 from scenelang.assets.records import Record
 from scenelang.language.diagnostics import plural
 from scenelang.language.nodes import Material
+from scenelang.language.noise import noise
 
 MAX_VECTOR: Final = 1_000_000  # numbers in one vector, nested ones counted
 MAX_VECTOR_DEPTH: Final = 16
+MAX_TEXT: Final = 10_000  # characters of what is joined, or set in letters
+MAX_PLACES: Final = 15
 
 
 class Problem(Exception):
@@ -28,7 +31,8 @@ class Problem(Exception):
     Args:
         message: the fact; made of ``expected`` and ``found`` where a kind of value was expected.
         operand: which operand or argument is to blame, from 0; None for all of it.
-        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, a ``colour`` of a string.
+        fix: what a fix may make of that operand: ``angle`` or ``hue`` with a unit, a ``colour`` of a string,
+            a ``text`` of a value.
         notes: words for further operands, by their numbers.
         letter: which character of that operand, a string.
         found: the kind that is odd about a value; problems that found the same may have one cause.
@@ -316,7 +320,22 @@ def binary(op: str, a: Any, b: Any) -> Any:
     if ca in UNITS and cb is Vec:
         return Vec(tuple([binary(op, a, y) for y in b.items]))
     message = f"cannot {_VERBS[op]} {describe(a)} {_PREPOSITIONS[op]} {describe(b)}"
-    raise _unfit(message, a, b, int(ca in UNITS or ca is Vec), op in "+-*")
+    problem = _unfit(message, a, b, int(ca in UNITS or ca is Vec), op in "+-*")
+    if op == "+" and (ca is str) != (cb is str):
+        other = int(ca is str)
+        problem.operand, problem.notes = other, {1 - other: "a string"}
+        problem.help = "only a string joins a string: write str(…) of a number or a boolean"
+        problem.fix = "text" if (a, b)[other].__class__ in (float, bool) else ""
+    raise problem
+
+
+def add(a: Any, b: Any) -> Any:
+    """``a + b``, which also joins two strings."""
+    if a.__class__ is not str or b.__class__ is not str:
+        return binary("+", a, b)
+    if len(a) + len(b) > MAX_TEXT:
+        raise Problem("E0323", f"a text of more than {MAX_TEXT:,} characters")
+    return a + b
 
 
 def negate(value: Any) -> Any:
@@ -516,6 +535,32 @@ def _len(value: Any) -> float:
     raise unexpected("a vector, a range or a string", value, operand=0)
 
 
+def text_of(value: Any, digits: Any = None) -> str:
+    """A number, a boolean or a string as text: the shortest that reads back, or with so many digits."""
+    if digits is not None:
+        return _rounded(number(value), number(digits, 1))
+    if value.__class__ is str:
+        return str(value)
+    if value.__class__ is bool:
+        return "true" if value else "false"
+    if value.__class__ not in UNITS:
+        raise unexpected("a number, a boolean or a string", value, operand=0)
+    shown, e, exponent = repr(number(value) + 0.0).partition("e")  # + 0.0 makes -0 a 0
+    return shown.removesuffix(".0") + (f"e{int(exponent)}" if e else "")
+
+
+def _rounded(x: float, places: float) -> str:
+    """A number with ``places`` digits behind the point, its exact value rounded, halves away from zero."""
+    if not (places.is_integer() and 0 <= places <= MAX_PLACES):
+        found = f"expected a whole number from 0 to {MAX_PLACES}, found {show(places)}"
+        raise Problem("E0305", found, operand=1)
+    (top, bottom), count = abs(x).as_integer_ratio(), int(places)
+    whole = (2 * top * 10**count + bottom) // (2 * bottom)
+    text = f"{whole:0{count + 1}d}"
+    text = f"{text[:-count]}.{text[-count:]}" if count else text
+    return f"-{text}" if x < 0 and whole else text
+
+
 def _splitmix64(state: int) -> int:
     """One output of SplitMix64 (Steele, Lea, Flood 2014)."""
     state = (state + 0x9E3779B97F4A7C15) & _MASK
@@ -531,6 +576,17 @@ def rand(seed: Any) -> float:
         bits = struct.unpack("<Q", struct.pack("<d", number(item) + 0.0))[0]  # + 0.0 makes -0 a 0
         state = _splitmix64(state ^ bits)
     return (state >> 11) / (1 << 53)
+
+
+def _noise(v: Any, seed: Any = 0.0) -> float:
+    point = v.items if v.__class__ is Vec else (v,)
+    if not 0 < len(point) <= 3:
+        raise unexpected("a number or a vector of 1 to 3", v, operand=0)
+    whole = number(seed, 1)
+    if not whole.is_integer():
+        raise Problem("E0305", f"expected a whole number, found {show(whole)}", operand=1)
+    x, y, z = (*map(number, point), 0.0, 0.0)[:3]
+    return noise(x, y, z, int(whole))
 
 
 def _hsv(h: Any, s: Any, v: Any) -> Vec:
@@ -558,7 +614,9 @@ FUNCTIONS: Final[dict[str, Callable[..., Any]]] = {
     "mix": _whole(_mix),
     "smoothstep": _whole(_smoothstep),
     "len": _len,
+    "str": text_of,
     "rand": rand,
+    "noise": _noise,
     "rgb": lambda *components: Vec(tuple([number(c, i) for i, c in enumerate(components)])),
     "hsv": _hsv,
 }

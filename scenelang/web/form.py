@@ -276,9 +276,11 @@ class Writer:
                     return ["width", self._font(bound), *self._text("width", expr.args, scope)]
                 if bound is not None:
                     return ["call", *self.call(bound, expr.args, scope)]
+                if name == "str":
+                    self.written |= {*"0123456789-.e", *"true", *"false"}
                 word = words.FUNCTIONS[name]
                 args = [arg.value for arg in expr.args] if word.variadic else bind(word.params, expr.args)
-                return [name, *self.given(args, scope)]
+                return [name, *self.given((arg for arg in args if arg is not None), scope)]
             case nodes.Index():
                 return ["@", self.expression(expr.value, scope), self.expression(expr.index, scope)]
             case nodes.Member():
@@ -439,7 +441,9 @@ class Writer:
         assert zoo is not None
         assert zoo.font is not None
         font, letters, pairs = zoo.font, dict[str, Json](), dict[str, float]()
-        for letter in sorted(self.written & font.letters.keys()):
+        parts = {*normalize("NFD", "".join(self.written))}  # which joined texts may bring together
+        made = {one for one in font.letters if len(own := {*normalize("NFD", one)}) > 1 and own <= parts}
+        for letter in sorted(self.written & font.letters.keys() | made):
             advance, x, y, radius = font.metrics[font.letters[letter]]
             called = name_of(letter)
             shape = self._shape(f"{file}.{called}") if called in font.glyphs else -1
@@ -542,7 +546,7 @@ def form_of(
 def _stage() -> Json:
     """The usual stage, and of each argument of its words the renderers' field, its kind and its range."""
     usual, fields = {**stage_data(Stage()), "sky": stage_data(Sky())}, {}
-    usual["light"]["radius"], usual["ground"]["fade"] = 0.0, FADE
+    usual["light"]["radius"], usual["ground"]["fade"], usual["camera"]["exposure"] = 0.0, FADE, 1.0
     for name, word in words.STAGE.items():
         schema = getattr(scene, name.capitalize()).model_json_schema()["properties"].values()
         least = [one.get("minimum", one.get("exclusiveMinimum", -MOST)) for one in schema]

@@ -44,7 +44,7 @@ def shader(network: SolidArrays, store: ArrayStore) -> dict[str, Any]:
     parts += [f"const int {name} = {value};" for name, value in sizes.items()]
     usual = stage_data(Stage())
     usual["lights"] = [{**usual.pop("light"), "radius": 0.0}]
-    usual["ground"]["fade"] = FADE
+    usual["ground"]["fade"], usual["camera"]["exposure"] = FADE, 1.0
     parts += ["#ifndef LAMPS\n#define LAMPS 1\n#endif", _struct("Stage", usual)]
     said = "of each join what is made of a distance, a bump; then lines"
     parts += [f"uniform vec4 cells[{len(cells)}]; // {said}"]

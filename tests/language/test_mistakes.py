@@ -266,7 +266,7 @@ def test_labels_show_both_places() -> None:
 
 def test_labels_show_what_else_takes_part() -> None:
     for text, labels in (
-        ('square { translate("a" + 1, 0); }', [("1", "a number")]),
+        ('square { translate("a" + 1, 0); }', [('"a"', "a string")]),
         ('square { translate(1 - "a", 0); }', [("1", "a number")]),
         ("square { translate([1, 2] + [1, 2, 3]); }", [("[1, 2]", "2 items"), ("[1, 2, 3]", "3 items")]),
         ("square { rotate(45deg + 1); }", [("45deg", "an angle")]),
@@ -366,7 +366,8 @@ HELPED = {
     "star { shadow(0.1); }": "in the plane draw the object twice",
     "sphere { blur(3); }": "nothing is blurred",
     "sphere { material glossy { ior(1.5); } }": "light is not bent",
-    'let a = format("x", 2); star;': "strings are not put together",
+    'let a = format("x", 2); star;': "write str(v, digits = 2), and join strings by +",
+    'let a = "x" + [1, 2]; star;': "write str(…) of a number or a boolean",
     "star { keyframe(2); }": "there is bend, displace, grow, matrix, rotate, scale, shear,",
     "star { material flat { bloom(2); } }": "there is color, density, flip, glow, grayscale,",
     "let a = debug(2); star;": "there is abs, acos, asin,",

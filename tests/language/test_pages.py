@@ -100,7 +100,7 @@ def test_pages_state_the_lists_and_limits_of_the_code() -> None:
         "E0320": f"{limits.MAX_OBJECTS:,} objects",
         "E0321": f"{limits.MAX_DEPTH} deep, or groups more than {schema.MAX_NODE_DEPTH}",
         "E0322": f"{limits.MAX_STEPS // 1_000_000} million steps",
-        "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep",
+        "E0323": f"nest more than {values.MAX_VECTOR_DEPTH} deep, or `+` makes a text",
         "E0324": f"{limits.MAX_BYTES // 1_000_000} MB, or imports nest more than {session.MAX_IMPORT_DEPTH}",
         "E0405": f"{lower.MAX_DEPTH:,} levels",
     }.items():

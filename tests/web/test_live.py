@@ -380,6 +380,18 @@ def test_letters_and_their_marks(viewer_page: Any) -> None:
     assert check_cases(viewer_page, SourceFile("scene.nsg", text), [({}, 0)]) == 1
 
 
+def test_texts_that_a_scene_puts_together(viewer_page: Any) -> None:
+    text = """import "std/letters" as abc; param v = 0.5; param n = 7 in 0..9; let mark = "\u0301";
+    abc.text("v = " + str(v, digits = 2) + ", " + str(n > 3) + " e" + mark);
+    disc { scale(abc.width(str(v))); }"""
+    cases: list[Any] = [({}, 0), ({"v": -1.2345678e-9, "n": 2}, 0), ({"v": 4e21}, 0)]
+    assert check_cases(viewer_page, SourceFile("scene.nsg", text), cases) == 3
+    long = (
+        'param n = 2; fn twice(s, n) = n == 0 ? s : twice(s + s, n - 1); disc { scale(len(twice("ab", n))); }'
+    )
+    assert check_cases(viewer_page, SourceFile("scene.nsg", long), [({}, 0), ({"n": 13}, 0)]) == 1
+
+
 MODEL = load_manifest("shapes2d")
 LITERALS = """0 1 2 3 0.5 -1 -2.5 7 1e-3 10 0.1 -0 1e200 255 30deg -45deg 0.5rad 0.25turn 0deg 2s 40ms -1s 0s
     [1,2] [0,1,0.5] X #d33 #7a5c3e [] [1,[2,3]] [10deg,20deg] [-1,0.5] true false "a" "day" "ä😀" none PI TAU
@@ -466,6 +478,14 @@ def test_random_expressions(viewer_page: Any) -> None:
     pick = random.Random(1)
     texts = [written(pick, pick.randint(1, 3)) for _ in range(2500)]
     texts += [f"rand({pick.choice([n, n / 7, -n, [n, n + 1]])})" for n in range(200)]
+    texts += [
+        f"str({x!r}{digits})"
+        for x in (10.0 ** pick.uniform(-9, 23) * pick.choice([-1, 1]) for _ in range(200))
+        for digits in ("", f", {pick.randint(0, 15)}")
+    ]
+    spots = [[pick.uniform(-9, 9) * 10.0 ** pick.randint(0, 8) for _ in range(n % 3 + 1)] for n in range(200)]
+    texts += [f"noise({spot}, seed = {pick.randint(-9, 2**40)})" for spot in spots]
+    texts += [f"str({n / 16}, {n % 5})" for n in range(-99, 99)]
     made = [(text, *pair) for text in texts if (pair := evaluated(text)) is not None]
     shown = viewer_page.evaluate(VALUES, [form for _, _, form in made])
     for (text, value, _), answer in zip(made, shown, strict=True):

@@ -546,6 +546,20 @@ def test_faces_in_one_plane_are_as_the_formulas_say(page: Any, name: str) -> Non
     assert flush.wrong(pictured(page, nsg.compile(text))[..., :3], nsg.render(text, backend="reference")) < 8
 
 
+# ---------------------------------------------------------------- exposure
+
+
+@pytest.mark.browser
+@pytest.mark.parametrize("more", ["", "background(none);"])
+def test_pages_multiply_light_by_the_exposure(page: Any, more: str) -> None:
+    for e in (0.4, 2.5):
+        program = nsg.compile(nsg.loads(f"{EXPOSED} {more} camera(exposure = {e});"))
+        assert compared(page, program) > 40
+
+
+EXPOSED = """canvas(64, 48); sphere { scale(0.8); material diffuse { color(#b55); } }
+torus { translate(1.2, 0.3, 0); material volumetric; }"""
+
 # ---------------------------------------------------------------- every size
 
 

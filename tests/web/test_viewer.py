@@ -211,6 +211,12 @@ def test_another_view_keeps_what_was_moved(shown: Any) -> None:
         assert ask(page, "[made, globalThis.light?.top]") == [made, None if at == 0 else 2]
 
 
+def test_the_line_of_a_camera_keeps_its_exposure(shown: Any) -> None:
+    page = shown(SOLID.replace("40deg", "40deg, exposure = 2.5"))
+    ask(page, "viewer.pan(0.5, 0)")
+    assert nsg.loads(f"{ask(page, 'viewer.cameraLine()')} sphere;").camera.exposure == 2.5  # type: ignore[union-attr]
+
+
 def test_orbits_zooms_and_pans(shown: Any) -> None:
     page = shown(SOLID)
     assert ask(page, "viewer.cameraLine()") == "camera(eye = [1, 2, 4], target = [0, 0.5, 0], fov = 40deg);"

@@ -19,7 +19,7 @@ syntax keyword nsgConstant PI TAU X Y Z none
 syntax keyword nsgAnimated t u frame frames
 syntax match nsgSetting /\<\%(canvas\|background\|animate\|samples\|camera\|light\|ground\|sky\)\>\ze\s*(/
 syntax match nsgTransform /\<\%(translate\|rotate\|scale\|shear\|matrix\|twirl\|bend\|twist\|displace\|grow\|shell\|flip\|color\|grayscale\|hue\|opacity\|glow\|density\|roughness\|stop\)\>\ze\s*(/
-syntax match nsgFunction /\<\%(sin\|cos\|tan\|asin\|acos\|atan2\|abs\|min\|max\|clamp\|floor\|ceil\|round\|sqrt\|exp\|log\|mix\|smoothstep\|len\|rand\|rgb\|hsv\)\>\ze\s*(/
+syntax match nsgFunction /\<\%(sin\|cos\|tan\|asin\|acos\|atan2\|abs\|min\|max\|clamp\|floor\|ceil\|round\|sqrt\|exp\|log\|mix\|smoothstep\|len\|str\|rand\|noise\|rgb\|hsv\)\>\ze\s*(/
 syntax match nsgNumber /\<\d\+\%(\.\.\@!\d*\)\?\%([eE][-+]\?\d\+\)\?\%(deg\|rad\|turn\|ms\|s\)\?\w\@!/
 syntax match nsgNumber /\w\@<!\.\d\+\%([eE][-+]\?\d\+\)\?\%(deg\|rad\|turn\|ms\|s\)\?\w\@!/
 " End of words

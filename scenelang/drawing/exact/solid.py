@@ -474,9 +474,11 @@ def solid_image(
         parts.append(samples.reshape(-1, 4, len(rows), per_side, width, per_side).mean((3, 5)))
         progress(rows.stop / height)
     found = np.concatenate(parts, 2)
-    image = from_light(found.mean(0), stage.transparent)
+    image, *halves = (
+        from_light(light, stage.transparent, stage.camera.exposure) for light in (found.mean(0), *found)
+    )
     if len(found) == 2:
-        one, other = (np.asarray(from_light(half, stage.transparent), np.float64) for half in found)
+        one, other = (np.asarray(half, np.float64) for half in halves)
         image.noise = float(np.sqrt(np.mean((one - other) ** 2))) / 2.0
     return image
 

@@ -617,7 +617,7 @@ def draw_solids(
         return out.view(Image), sum(costs, Work())
     if not np.isfinite(out).all():
         raise ProgramError("numbers that the network cannot draw with")
-    return from_light(out, stage.transparent), sum(costs, Work())
+    return from_light(out, stage.transparent, stage.camera.exposure), sum(costs, Work())
 
 
 def paced(field: SolidField, pace: MarchSettings) -> MarchSettings:
@@ -653,7 +653,8 @@ def _band(
         once, work = _shade(lighting, canvas, x_centres, y_centres, 2 / min(canvas), centres)
         band = slice(rows.start - near.start, rows.stop - near.start)
         picture = np.ascontiguousarray(once[:4, band])
-        shown = once[3:] if lighting.stage.transparent else once[4:]
+        shown = lighting.stage.camera.exposure * once[4:]
+        shown = np.concatenate([once[3:4], shown]) if lighting.stage.transparent else shown
         y, x = np.nonzero(rough(shown, lighting.pace.contrast)[band])
     else:
         centres, picture, work = None, np.empty((4, len(rows), width), np.float32), Work()

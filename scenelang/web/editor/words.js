@@ -9,7 +9,7 @@ export const WORDS = [
   {"scope": "variable.language", "words": ["t", "u", "frame", "frames"], "after": "(?!\\s*[({])"},
   {"scope": "support.function.setting", "words": ["canvas", "background", "animate", "samples", "camera", "light", "ground", "sky"], "after": "(?=\\s*\\()"},
   {"scope": "support.function.transform", "words": ["translate", "rotate", "scale", "shear", "matrix", "twirl", "bend", "twist", "displace", "grow", "shell", "flip", "color", "grayscale", "hue", "opacity", "glow", "density", "roughness", "stop"], "after": "(?=\\s*\\()"},
-  {"scope": "support.function", "words": ["sin", "cos", "tan", "asin", "acos", "atan2", "abs", "min", "max", "clamp", "floor", "ceil", "round", "sqrt", "exp", "log", "mix", "smoothstep", "len", "rand", "rgb", "hsv"], "after": "(?=\\s*\\()"},
+  {"scope": "support.function", "words": ["sin", "cos", "tan", "asin", "acos", "atan2", "abs", "min", "max", "clamp", "floor", "ceil", "round", "sqrt", "exp", "log", "mix", "smoothstep", "len", "str", "rand", "noise", "rgb", "hsv"], "after": "(?=\\s*\\()"},
 ];
 export const TERMINALS = {
   "NAME": "[A-Za-z_][A-Za-z0-9_]*(?!\\w)",

@@ -41,7 +41,7 @@ export function panned(camera, right, up) {
 
 /** A stage as another camera sees it, drawn in the unit that its own asks for. */
 export function seenBy(stage, { eye, target, fov }) {
-  return { ...stage, growth: growthOf(stage), camera: { eye, target, fov_rad: fov } };
+  return { ...stage, growth: growthOf(stage), camera: { ...stage.camera, eye, target, fov_rad: fov } };
 }
 
 /** The line of a scene that says where a camera is; its numbers are rounded to 1e-4 and finer
@@ -50,7 +50,8 @@ export function cameraText(camera) {
   const digits = 4 - Math.floor(Math.log10(Math.hypot(...vecMinus(camera.eye, camera.target))));
   const point = (p) => `[${p.map((v) => plainNumber(v, Math.max(4, Math.min(20, digits)))).join(", ")}]`;
   const fov = plainNumber((camera.fov * 180) / Math.PI, 3);
-  return `camera(eye = ${point(camera.eye)}, target = ${point(camera.target)}, fov = ${fov}deg);`;
+  const times = camera.exposure === undefined ? "" : `, exposure = ${camera.exposure}`;
+  return `camera(eye = ${point(camera.eye)}, target = ${point(camera.target)}, fov = ${fov}deg${times});`;
 }
 
 /** A number with at most so many places, none of them idle. */

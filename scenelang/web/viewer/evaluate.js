@@ -12,6 +12,7 @@ import { sharesOf, stageFrom } from "./stage.js";
 import { checkEye } from "./eye.js";
 
 const MOST_WORK = 5e6; // passes of loops, calls, objects, transforms and numbers of vectors
+const LETTERS_AS_NUMBER = 16;
 const MOST_CALLS = 200; // within each other
 const MOST_FRAMES = 1e6;
 
@@ -91,7 +92,10 @@ class SceneRun {
   }
 
   weigh(values) {
-    for (const value of values) if (value instanceof Vec) this.spend(value.count);
+    for (const value of values) {
+      if (value instanceof Vec) this.spend(value.count);
+      if (typeof value === "string") this.spend(value.length / LETTERS_AS_NUMBER);
+    }
   }
 
   enter() {

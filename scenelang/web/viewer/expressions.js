@@ -1,7 +1,7 @@
 // Expressions of a form, prepared into closures from a call's slots to a value.
 
 import { Progression, Time, Angle, Vec, Wearing } from "./values.js";
-import { ARITHMETIC, ORDER, arithmetic, bare, equal, finite, kindOf, negative, ordered } from "./values.js";
+import { ARITHMETIC, ORDER, added, arithmetic, bare, equal, finite, kindOf, negative, ordered } from "./values.js";
 import { positive, refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { FUNCTIONS } from "./functions.js";
 import { lineOf } from "./letters.js";
@@ -45,7 +45,7 @@ function operation(plain, word, [left, right], run) {
     const [a, b] = [first(slots), second(slots)];
     if (typeof a === "number" && typeof b === "number") return finite(plain(a, b));
     run.weigh([a, b]);
-    return arithmetic(word, a, b);
+    return word === "+" ? added(a, b) : arithmetic(word, a, b);
   };
 }
 

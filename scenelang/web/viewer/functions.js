@@ -75,6 +75,24 @@ function lengthOf(value) {
   return typeof value === "string" ? [...value].length : refuse(`${kindOf(value)} has no length`);
 }
 
+const MOST_PLACES = 15;
+
+/** A number, a boolean or a string as text, as `values.text_of` in scenelang/language writes it. */
+function textOf(value, digits) {
+  if (digits !== undefined) return rounding(bare(value), bare(digits));
+  if (typeof value === "string" || typeof value === "boolean") return String(value);
+  const size = Math.abs(bare(value));
+  return size > 0 && (size < 1e-4 || size >= 1e16) ? value.toExponential().replace("e+", "e") : String(value);
+}
+
+function rounding(x, places) {
+  if (!Number.isInteger(places) || places < 0 || places > MOST_PLACES) refuse(`${places} digits of a number`);
+  const size = Math.abs(x);
+  const zeros = places > 0 ? `.${"0".repeat(places)}` : "";
+  const text = size < 1e21 ? size.toFixed(places) : BigInt(size) + zeros; // from there on toFixed has exponents
+  return x < 0 && /[1-9]/.test(text) ? `-${text}` : text;
+}
+
 const MASK_64 = (1n << 64n) - 1n;
 const BITS_OF_SEED = new DataView(new ArrayBuffer(8));
 
@@ -94,6 +112,33 @@ function randomOf(seed) {
     state = splitMix64(state ^ BITS_OF_SEED.getBigUint64(0));
   }
   return Number(state >> 11n) / 2 ** 53;
+}
+
+const NOISE_FACTORS = [0x8da6b343, 0xd8163841, 0xcb1ab31f, 0x9e3779b9];
+const NOISE_ROUNDS = [[16, 0x21f0aaad], [15, 0x735a2d97], [15, 1]];
+
+/** The gradient of a lattice point times (x, y, z), as scenelang/language/noise.py has it. */
+function slopeAt(i, j, k, seed, x, y, z) {
+  let h = [i, j, k, seed].reduce((sum, whole, at) => sum ^ Math.imul(whole, NOISE_FACTORS[at]), 0);
+  for (const [shift, factor] of NOISE_ROUNDS) h = Math.imul(h ^ (h >>> shift), factor);
+  const index = (h >>> 0) % 12;
+  const [a, b] = [[x, y], [x, z], [y, z]][index >> 2];
+  return (index & 2 ? -a : a) + (index & 1 ? -b : b);
+}
+
+const easing = (t) => t * t * t * (t * (6 * t - 15) + 10);
+const mixture = (a, b, share) => a + share * (b - a);
+
+function noiseOf(v, seed = 0) {
+  const point = v instanceof Vec ? v.items.map(bare) : [bare(v)];
+  if (point.length === 0 || point.length > 3) refuse(`expected a vector of 1 to 3, found ${kindOf(v)}`);
+  if (!Number.isInteger(bare(seed))) refuse(`a seed of ${seed}`);
+  const [i, j, k] = [0, 1, 2].map((at) => Math.floor(point[at] ?? 0));
+  const [x, y, z] = [i, j, k].map((whole, at) => (point[at] ?? 0) - whole);
+  const at = (dx, dy, dz) => slopeAt(i + dx, j + dy, k + dz, seed, x - dx, y - dy, z - dz);
+  const row = (dy, dz) => mixture(at(0, dy, dz), at(1, dy, dz), easing(x));
+  const layer = (dz) => mixture(row(0, dz), row(1, dz), easing(y));
+  return mixture(layer(0), layer(1), easing(z));
 }
 
 /** Red, green and blue of a hue in turns, a saturation and a value. */
@@ -130,7 +175,9 @@ export const FUNCTIONS = {
   mix: mixed,
   smoothstep: smoothed,
   len: lengthOf,
+  str: textOf,
   rand: randomOf,
+  noise: noiseOf,
   rgb: (...parts) => new Vec(parts.map(bare)),
   hsv: hsvColour,
 };

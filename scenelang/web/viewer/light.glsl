@@ -227,7 +227,7 @@ layout(location = 1) out vec4 brightness;
 
 // Premultiplied and sRGB-encoded.
 vec4 encoded(vec4 light) {
-  vec3 x = clamp(light.rgb / max(light.a, 1e-6), 0.0, 1.0);
+  vec3 x = clamp(stage.camera.exposure * light.rgb / max(light.a, 1e-6), 0.0, 1.0);
   vec3 curved = 1.055 * pow(max(x, vec3(1e-9)), vec3(1.0 / 2.4)) - 0.055;
   x = mix(curved, 12.92 * x, vec3(lessThanEqual(x, vec3(0.0031308))));
   return vec4(x * light.a, light.a);
@@ -259,7 +259,7 @@ void main() {
     light += one / float(samples);
   }
 #ifndef FOUR
-  brightness = sqrt(clamp(plain, 0.0, 1.0));
+  brightness = sqrt(clamp(vec4(stage.camera.exposure * plain.rgb, plain.a), 0.0, 1.0));
 #endif
 #ifdef COUNT
 #ifdef FOUR

@@ -248,7 +248,8 @@ export function solidDrawer(gl, view) {
     };
     for (const [name, value] of Object.entries(vectors)) gl.uniform3fv(at(name), value);
     const { light: _, ground, ...stage } = ready.stage;
-    setUniforms(gl, at, "stage", { ...stage, ground: ground && { fade: FADE, ...ground }, lights: lampsOf(ready.stage, lamps) });
+    const made = { camera: { exposure: 1, ...stage.camera }, ground: ground && { fade: FADE, ...ground } };
+    setUniforms(gl, at, "stage", { ...stage, ...made, lights: lampsOf(ready.stage, lamps) });
     gl.uniform4iv(at("grid"), ready.cells);
     gl.uniform4fv(at("cells"), network.cells);
     for (const [name, value] of Object.entries(around.uniforms(ready.by))) gl[`uniform${value.length}fv`](at(name), value);

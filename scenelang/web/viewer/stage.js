@@ -9,7 +9,7 @@ export const FADE = 8; // of a ground that does not say it
 
 /** Readers of arguments, by their kinds. */
 const KINDS_OF_STAGE = {
-  number: bare, power: bare, extent: bare, distance: bare, angle: radians, point: (value) => numbersOf(value, 3),
+  number: bare, power: bare, extent: bare, distance: bare, exposure: exposureFrom, angle: radians, point: (value) => numbersOf(value, 3),
   opaque: (value) => linearColour(sharesOf(value)),
 };
 
@@ -34,6 +34,10 @@ export function stageFrom({ background, ...given }, lamps, { dimension, stage: k
     const { fade: _, ...ground } = stage.ground;
     stage.ground = ground;
   }
+  if (stage.camera.exposure === 1) {
+    const { exposure: _, ...camera } = stage.camera;
+    stage.camera = camera;
+  }
   [stage.light] = stage.lights;
   if (stage.sky || stage.lights.length !== 1 || stage.light.radius) delete stage.light;
   else for (const word of ["sky", "lights"]) delete stage[word]; // as stages were before there was more
@@ -41,6 +45,10 @@ export function stageFrom({ background, ...given }, lamps, { dimension, stage: k
   if (eye.every((number, axis) => number === target[axis])) refuse("the eye is the target");
   if (!(view > 1 / MOST_OF_STAGE && view < Math.PI)) refuse("a field of view not between 0° and 180°");
   return { stage, background: behind };
+}
+
+function exposureFrom(value) {
+  return bare(value) > 0 ? value : refuse(`an exposure of ${value}`);
 }
 
 /** By how much lengths grow where a stage's view becomes as large as the usual one, as `scenelang/drawing/size.py`. */

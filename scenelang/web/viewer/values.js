@@ -198,6 +198,16 @@ export function arithmetic(op, a, b) {
   return refuse(`${kindOf(a)} ${op} ${kindOf(b)} means nothing`);
 }
 
+const MOST_LETTERS = 10_000;
+
+/** `a + b`, which also joins two strings. */
+export function added(a, b) {
+  if (typeof a !== "string" || typeof b !== "string") return arithmetic("+", a, b);
+  const text = a + b;
+  const long = text.length > MOST_LETTERS && [...text].length > MOST_LETTERS;
+  return long ? refuse("a text of more than 10,000 characters") : text;
+}
+
 /** `-value`. */
 export function negative(value) {
   if (value instanceof Vec) return new Vec(value.items.map(negative));

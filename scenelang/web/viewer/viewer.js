@@ -185,7 +185,7 @@ export class Viewer {
 
   /** The camera as a line of a scene. */
   cameraLine() {
-    return cameraText(this.camera);
+    return cameraText({ ...this.camera, exposure: this.program.stage.camera.exposure });
   }
 
   // ---------------------------------------------------------------- drawing
