@@ -211,7 +211,7 @@ def test_verbose(folder: Folder) -> None:
         "objects: 2 (1 square, 1 star)",
         "tokens: 2 union",
         "model shapes2d (the usual one of its dimension)",
-        "drawn on one core by the kernel",
+        " by the kernel\n",
     ):
         assert fact in said
     for stage in ("parse", "evaluate", "compile", "draw", "save"):
