@@ -46,13 +46,18 @@ MORE = {"assets", "editors", "fuzz", "inverse", "lab", "output", "play", "web"}
 """Folders whose tests are marked `more`: plain ``pytest`` leaves them to ``-m more``, as `.ci/run` says."""
 
 
-def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import no file whose tests the run leaves out, which takes each of its processes seconds."""
+    inside = collection_path.is_relative_to(TESTS) and collection_path != TESTS
+    if not inside or any(Path(arg).resolve() != TESTS for arg in config.args):
+        return None
+    more = collection_path.relative_to(TESTS).parts[0] in MORE
+    asked = config.option.markexpr
+    usual = asked in config.getini("addopts")  # no -m, or one that says what is usual
+    return (usual and more) or (asked.startswith("more and ") and not more) or None
+
+
+def pytest_collection_modifyitems(items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.relative_to(TESTS).parts[0] in MORE:
             item.add_marker("more")
-    asked = config.option.markexpr not in config.getini("addopts")  # -m, unless it says what is usual
-    if asked or any(Path(arg).resolve() != TESTS for arg in config.args):
-        return
-    left = [item for item in items if item.get_closest_marker("more")]
-    config.hook.pytest_deselected(items=left)
-    items[:] = [item for item in items if not item.get_closest_marker("more")]
