@@ -21,7 +21,7 @@ UNDER_SKY_DB = 23.0  # the reference alone is 25 dB off in a closed room
 # the reference takes seconds, or its paths miss what lights them
 UNTRACED = {"cumulus", "fog", "neon", "paperlamp"}
 # shorter sides, in the plane and in space: small for speed, and odd, as edges through samples are ties
-DRAWN_PX, SMALL_PX = {False: 61, True: 23}, {False: 40, True: 14}
+DRAWN_PX, SMALL_PX = {False: 41, True: 17}, {False: 40, True: 10}
 
 
 def sized(scene: nsg.Scene, shorter_px: int) -> nsg.Scene:
@@ -58,7 +58,7 @@ def test_example_is_drawn(path: Path) -> None:
     if scene.animation is not None and scene.animation.loop:
         # from the last frame to the first is no larger a step than those around it
         around = [sized(nsg.load(path, frame=frame % frames), SMALL_PX[solid]) for frame in range(-4, 2)]
-        drawn = [premultiplied(nsg.render(scene, backend="reference")) for scene in around]
+        drawn = [premultiplied(nsg.render(scene)) for scene in around]
         steps = [float(np.abs(a - b).mean()) for a, b in pairwise(drawn)]
         assert steps[3] <= 1.3 * max(steps[:3] + steps[4:]) + 0.002
 

@@ -119,8 +119,8 @@ def test_pictures_are_those_of_the_reference(first: str, last: str) -> None:
     )
     objects = [MIXED[0]._replace(material=first), MIXED[1], small, Object("sphere", (scaled(0.3),))]
     stage = Stage(lights=(Light((1.0, 2.5, 2.0), 12.0, (1.0, 0.9, 0.8)),))
-    exact = solid_image(graph(objects), stage, (48, 40))
-    assert psnr_db(draw_solids(field(objects), stage, (48, 40))[0], exact) > 38
+    exact = solid_image(graph(objects), stage, (32, 26))
+    assert psnr_db(draw_solids(field(objects), stage, (32, 26))[0], exact) > 38
 
 
 def test_tiles_and_threads_leave_no_trace(monkeypatch: pytest.MonkeyPatch) -> None:
@@ -244,8 +244,8 @@ def test_a_medium_glows_where_the_light_is_behind_it(radius: float, away: float,
 def test_colours_and_shadows_change_within_media(other: Object, least: float) -> None:
     """A later medium in another, and a shadow that falls into one: three nodes a ray do not tell where."""
     objects = [Object("sphere", (scaled(0.9),), "volumetric", (0.9, 0.5, 0.1)), other]
-    exact = solid_image(graph(objects), Stage(), (40, 40))
-    assert psnr_db(draw_solids(field(objects), Stage(), (40, 40))[0], exact) > least
+    exact = solid_image(graph(objects), Stage(), (28, 28))
+    assert psnr_db(draw_solids(field(objects), Stage(), (28, 28))[0], exact) > least
 
 
 def test_what_is_cut_out_of_a_medium_is_not_in_it() -> None:
@@ -389,12 +389,12 @@ SCENES = {
 @pytest.mark.parametrize("name", SCENES)
 def test_pictures_are_those_of_the_reference_of_solid_textures(name: str) -> None:
     objects, least = SCENES[name]
-    exact = solid_image(graph(objects), Stage(), (32, 32))
-    found, _ = draw_solids(field(objects), Stage(), (32, 32))
+    exact = solid_image(graph(objects), Stage(), (20, 20))
+    found, _ = draw_solids(field(objects), Stage(), (20, 20))
     assert psnr_db(found, exact) > least
-    plain, _ = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (32, 32))
+    plain, _ = draw_solids(field([o._replace(paint=None) for o in objects]), Stage(), (20, 20))
     assert psnr_db(plain, exact) < psnr_db(found, exact) - 6
-    other, _ = draw_solids(field(objects, torch_network()), Stage(), (32, 32))
+    other, _ = draw_solids(field(objects, torch_network()), Stage(), (20, 20))
     assert abs(np.asarray(other) - found).max() < 2 / 255
 
 

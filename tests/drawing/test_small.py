@@ -56,7 +56,7 @@ def assert_same(p: Program, **options: str) -> None:
 @pytest.mark.parametrize("path", EXAMPLES, ids=lambda path: path.stem)
 def test_examples_look_the_same(path: Path) -> None:
     scene = nsg.load(path)
-    p = compile_scene(scene.model_copy(update={"canvas": (51, 37)}))
+    p = compile_scene(scene.model_copy(update={"canvas": (26, 19)}))
     if p.stage is None or p.stage.sky is None:  # whose light is the kernel's alone
         assert_same(p)
 
