@@ -186,7 +186,7 @@ def test_paths_and_quadrature(monkeypatch: pytest.MonkeyPatch) -> None:
     stage = Stage(lights=lamps, ground=ground, horizon=DARK, zenith=DARK)
     d = straight(stage, 8)
     expected = radiance(ExactField(root), stage, d)[:3]
-    mean, error = found(root, replace(stage, sky=Sky(0.0, DARK, DARK)), d, 256)
+    mean, error = found(root, replace(stage, sky=Sky(0.0, DARK, DARK)), d, 128)
     assert mean.mean(1) == pytest.approx(expected.mean(1), rel=0.01)
     assert (abs(mean - expected) < 0.02 * expected + 5.0 * error + 1e-6).mean() > 0.98
 

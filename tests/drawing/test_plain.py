@@ -301,17 +301,6 @@ def test_lamps_are_shown_as_rays_show_them(name: str, library: str) -> None:
     assert work.near > 0
 
 
-def test_both_libraries_show_the_same() -> None:
-    found = []
-    for library in NETS:
-        apart, rng = of(shipped("bracket"), library).opaque(0.6), np.random.default_rng(4)
-        p = np.stack([rng.uniform(-2, 2, 300), np.full(300, -1.3), rng.uniform(-2, 2, 300)])
-        given = [part.astype(np.float32) for part in (p, np.repeat([[0.0], [1.0], [0.0]], 300, 1))]
-        found.append(call(apart, "shown", np.array([1.0, 3.0, 1.0], np.float32), 0.5, *given)[0])
-    assert (abs(found[0] - found[1]) > 1e-3).mean() < 0.02
-    assert np.ptp(found[0]) > 0.5
-
-
 @pytest.mark.parametrize("text", ["", "light([1, 3, 2], radius = 0.4);"])
 def test_torch_draws_without_the_kernel(text: str, monkeypatch: pytest.MonkeyPatch) -> None:
     scene = loads(f"canvas(20, 16); {text} sphere {{ }} torus {{ translate(1, 0, 0); material volumetric; }}")

@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-
 import numpy as np
 import pytest
 
@@ -246,34 +244,6 @@ def test_colours_and_shadows_change_within_media(other: Object, least: float) ->
     objects = [Object("sphere", (scaled(0.9),), "volumetric", (0.9, 0.5, 0.1)), other]
     exact = solid_image(graph(objects), Stage(), (28, 28))
     assert psnr_db(draw_solids(field(objects), Stage(), (28, 28))[0], exact) > least
-
-
-def test_what_is_cut_out_of_a_medium_is_not_in_it() -> None:
-    """Ways in a ball that two others cut, from outside and from inside it, against intervals."""
-    cuts = [((-0.2, 0.0, 0.3), 0.6), ((0.3, 0.0, -0.2), 0.5)]
-    ball = Object("sphere", (scaled(1),), "volumetric")
-    holes = [Object("sphere", (scaled(r), moved(*c)), token="subtract") for c, r in cuts]
-    solids = field([ball, *holes])
-    for eye in ([0.0, 0.5, 5.0], [0.0, 0.95, 0.0]):
-        origin = np.array(eye, np.float32)
-        way = np.random.default_rng(1).normal(0, 0.4, (3, 400)).astype(np.float32) - origin[:, None]
-        way /= np.linalg.norm(way, axis=0)
-        trail = solids.march(origin, way, np.full(400, 9.0, np.float32), gap=0.009)
-        t = np.linspace(0, 7, 7001)
-        inside = _within(origin, way, (0, 0, 0), 1.0, t)
-        for centre, radius in cuts:
-            inside &= ~_within(origin, way, centre, radius, t)
-        assert trail.length == pytest.approx(inside.sum(1) * 1e-3, abs=0.02)  # ends to within 0.009
-
-
-def _within(
-    origin: np.ndarray, way: np.ndarray, centre: Sequence[float], radius: float, t: np.ndarray
-) -> np.ndarray:
-    """Whether points of rays are in a ball, (M, len(t))."""
-    to = np.array(centre) - origin
-    along = to @ way
-    half = np.sqrt(np.maximum(radius**2 - (to @ to - along**2), 0))
-    return abs(t - along[:, None]) < half[:, None]
 
 
 TORUS = 0.7, 0.3  # radii of its circle and of its tube
