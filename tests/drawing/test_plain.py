@@ -248,7 +248,7 @@ def test_pieces_of_media(media: Any, library: str) -> None:
     assert (begin[later + 1] >= end[later]).all()
     taken = sigma * (before + end - begin)
     assert (sigma * before)[later + 1] == pytest.approx(taken[later], abs=1e-4)
-    tables, some, count = tables_of(plain), np.flatnonzero(length > 0.2)[::10], 1000
+    tables, some, count = tables_of(plain), np.flatnonzero(length > 0.2)[::25], 1000
 
     def register(ray: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Colours and extinctions (4, K), and a mask of media (K,)."""

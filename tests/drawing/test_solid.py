@@ -196,7 +196,7 @@ def test_povray_draws_meshes_the_same() -> None:
         ("subtract", leaf("sphere", "diffuse", RED, scaled(0.5), moved(-0.9, 0.2, 0.5))),
         leaf("sphere", "diffuse", RED, scaled(0.3), moved(0.3, -0.6, 0.7)),
     )
-    assert_povray_agrees(root, Stage(), (60, 60), 48, brought={"ring": shape})
+    assert_povray_agrees(root, Stage(), (40, 40), 48, brought={"ring": shape})
 
 
 def test_an_eye_in_a_solid_sees_nothing() -> None:
