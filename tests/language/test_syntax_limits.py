@@ -8,7 +8,7 @@ from typing import Any
 import pytest
 
 from scenelang.language.parser import MAX_DEPTH
-from tests.language.reading import read, read_well
+from tests.language.reading import read
 from tests.work import ends, lines_run
 
 MANY = 20_000
@@ -128,12 +128,3 @@ for start, text in {STRETCHES}:
 def test_mistakes_at_the_ends_of_a_long_statement() -> None:
     _, diagnostics = read("let v = [" + "1, " * MANY + "; let a = 3;")
     assert 1 <= len(diagnostics) <= 2
-
-
-def test_work_is_linear() -> None:
-    def lines(count: int) -> int:
-        text = "square { scale(0.1234); rotate(30deg); translate(0.5, -0.25); }\n" * count
-        return lines_run(lambda: read_well(text))
-
-    lines(1)
-    assert lines(500) < 5.5 * lines(100)
