@@ -7,6 +7,7 @@ from typing import Any
 
 import pytest
 
+from scenelang.language import habits, recovery
 from scenelang.language.parser import MAX_DEPTH
 from tests.language.reading import read
 from tests.work import ends, lines_run
@@ -75,20 +76,30 @@ def test_braces_of_one_line_beside_others(brace: str) -> None:
     assert work(500) < 6 * work(100)
 
 
+@pytest.fixture
+def _few_in_detail(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Have the cause of twenty mistakes looked for in detail, and not of a hundred, which takes as long."""
+    monkeypatch.setattr(recovery, "_THOROUGH", 20)
+    monkeypatch.setattr(habits, "_MOST", 20)
+
+
+@pytest.mark.usefixtures("_few_in_detail")
 def test_the_cause_of_many_mistakes_is_not_looked_for_far_away() -> None:
-    """The first hundred are told in detail; what comes behind costs less, and the rest of 100 KB nothing."""
+    """The first are told in detail; what comes behind costs less, and the rest of the text nothing."""
 
     def work(count: int) -> int:
         return lines_run(lambda: read("..\n(1,2)\n" * count))
 
     work(1)
-    first = work(40)  # mistakes, at least
-    assert work(600) < 10 * first
+    first, many = work(8), work(120)  # mistakes, at least
+    assert many < 20 * first
+    assert work(600) < 1.2 * many
 
 
 GARBAGE = ["}", ")", ";", "@ ", "'", '"', "/*", "a$", "1 ", "{", "let = 1\n", "k = ", "scale(2) "]
 
 
+@pytest.mark.usefixtures("_few_in_detail")
 @pytest.mark.parametrize("text", GARBAGE)
 def test_garbage_takes_little_work(text: str) -> None:
     """Work grows no faster than the text, and a further token of garbage costs little.
