@@ -14,8 +14,6 @@
 from __future__ import annotations
 
 import re
-import shutil
-import tempfile
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Any
@@ -27,6 +25,7 @@ from mkdocs.structure.pages import Page
 
 from lab.docs.blocks import pictured
 from scenelang.cli.main import COMMANDS, Commands, cli
+from scenelang.language.diagnostics import SourceFile
 from scenelang.language.evaluation import Source
 from scenelang.web.export import PagePayload, control_rows, viewed
 from scenelang.web.export import page as page_of
@@ -101,11 +100,7 @@ def view_of_scene(scene: str | Path) -> PagePayload:
     """The scene of a page, from a text or a file."""
     if isinstance(scene, Path):
         return viewed(Source(scene, root=ROOT / "examples"), scene.stem)[0]
-    with tempfile.TemporaryDirectory() as folder:
-        shutil.copytree(ROOT / "examples", folder, dirs_exist_ok=True)  # some import from there
-        path = Path(folder, "scene.nsg")
-        path.write_text(scene, "utf-8")
-        return viewed(Source(path), path.stem)[0]
+    return viewed(Source(text=SourceFile("scene.nsg", scene), root=ROOT / "examples"), "scene")[0]
 
 
 def commands_page() -> str:

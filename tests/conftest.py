@@ -46,13 +46,26 @@ MORE = {"assets", "editors", "fuzz", "inverse", "lab", "output", "play", "web"}
 """Folders whose tests are marked `more`: plain ``pytest`` leaves them to ``-m more``, as `.ci/run` says."""
 
 
+def usual(config: pytest.Config) -> bool:
+    """Whether all tests are asked for, without -m or with one that says what is usual."""
+    asked = config.option.markexpr not in config.getini("addopts")
+    return not asked and all(Path(arg).resolve() == TESTS for arg in config.args)
+
+
+def pytest_ignore_collect(collection_path: Path, config: pytest.Config) -> bool | None:
+    """Import no folder whose tests the run leaves out, which takes each of its processes seconds."""
+    if collection_path.parent != TESTS or not collection_path.is_dir():
+        return None
+    more = collection_path.name in MORE
+    only = config.option.markexpr.startswith("more and ") and not more
+    return (more and usual(config)) or only or None
+
+
 def pytest_collection_modifyitems(config: pytest.Config, items: list[pytest.Item]) -> None:
     for item in items:
         if item.path.relative_to(TESTS).parts[0] in MORE:
             item.add_marker("more")
-    asked = config.option.markexpr not in config.getini("addopts")  # -m, unless it says what is usual
-    if asked or any(Path(arg).resolve() != TESTS for arg in config.args):
-        return
-    left = [item for item in items if item.get_closest_marker("more")]
-    config.hook.pytest_deselected(items=left)
-    items[:] = [item for item in items if not item.get_closest_marker("more")]
+    if usual(config):
+        left = [item for item in items if item.get_closest_marker("more")]
+        config.hook.pytest_deselected(items=left)
+        items[:] = [item for item in items if not item.get_closest_marker("more")]

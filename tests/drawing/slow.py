@@ -34,18 +34,19 @@ class Slow:
         hidden = np.maximum(code @ self.w["lift_w"] + self.w["lift_b"], 0)
         one = np.concatenate([code, hidden, [1]])
         lines, r = np.tensordot(one, self.w["lines"], 1), one @ self.w["radius"]
-        result = []
-        for x, y in q:
-            radius, features = math.hypot(x, y), [math.hypot(x, y), abs(x), abs(y), y]
-            for n in (3, 5, 6):  # the angle to the nearest of n directions, the first of which is +y
-                turn = math.tau / n
-                angle = abs((math.atan2(x, y) + turn / 2) % turn - turn / 2)
-                features += [radius * math.cos(angle), radius * math.sin(angle)]
-            levels = lines @ [*features, 1]
-            notch, *units, inner = levels.reshape(-1, 3)
-            length = max(np.linalg.norm(np.maximum(unit, 0)) for unit in units)
-            result.append(length + min(max(inner), 0) - np.linalg.norm(np.maximum(notch, 0)) - r)
-        return np.array(result)
+        x, y = q.T
+        radius = np.hypot(x, y)
+        features = [radius, abs(x), abs(y), y]
+        for n in (3, 5, 6):  # the angle to the nearest of n directions, the first of which is +y
+            turn = math.tau / n
+            angle = abs((np.arctan2(x, y) + turn / 2) % turn - turn / 2)
+            features += [radius * np.cos(angle), radius * np.sin(angle)]
+        levels = np.tensordot(lines, np.stack([*features, 0 * x + 1]), 1).reshape(-1, 3, len(x))
+        notch, units, inner = levels[0], levels[1:-1], levels[-1]
+        length = np.linalg.norm(np.maximum(units, 0), axis=1).max(0)
+        return np.asarray(
+            length + np.minimum(inner.max(0), 0) - np.linalg.norm(np.maximum(notch, 0), axis=0) - r
+        )
 
     def colour(self, m: Array) -> Array:
         """The colour (3,) that a material vector (32,) shows."""

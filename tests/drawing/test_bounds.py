@@ -75,33 +75,32 @@ def wild(rng: np.random.Generator) -> nsg.Scene:
     return nsg.Scene(elements=ZOO, nodes=nsg.Chain(links))
 
 
-def of_sets(seed: int) -> Iterator[tuple[str, nsg.Scene]]:
+def of_sets() -> Iterator[tuple[str, nsg.Scene]]:
     for name, config in SETS.items():
-        side = 64 if max(config.objects) > 16 else 88
-        yield name, random_scene(rng_of(seed, 0), config).sized((side, 80))
+        side = 64 if max(config.objects) > 16 else 72
+        yield name, random_scene(rng_of(0, 0), config).sized((side, 64))
 
 
-def of_probes(seed: int) -> Iterator[tuple[str, nsg.Scene]]:
+def of_probes() -> Iterator[tuple[str, nsg.Scene]]:
     for name, probe in FLAT.probes.items():
         for value in (probe.values[0], probe.values[-1]):
             if value <= 16 or name not in ("objects", "blends", "canvas"):
-                yield f"{name} {value}", probe.make(rng_of(seed, 0), value).sized((88, 80))
+                yield f"{name} {value}", probe.make(rng_of(0, 0), value).sized((72, 64))
 
 
-def of_all_kinds(seed: int) -> Iterator[tuple[str, nsg.Scene]]:
-    for at in range(8 * seed, 8 * seed + 8):
-        yield f"tree {at}", random_tree(at).sized((88, 80))
-        yield f"blob {at}", blob_scene(at).sized((88, 80))
-        yield f"wild {at}", wild(rng_of(at, 0)).sized((88, 80))
+def of_all_kinds() -> Iterator[tuple[str, nsg.Scene]]:
+    for at in range(8):
+        yield f"tree {at}", random_tree(at).sized((72, 64))
+        yield f"blob {at}", blob_scene(at).sized((72, 64))
+        yield f"wild {at}", wild(rng_of(at, 0)).sized((72, 64))
 
 
-@pytest.mark.parametrize("seed", range(2))
 @pytest.mark.parametrize("kind", [of_sets, of_probes, of_all_kinds])
 def test_nothing_that_shows_is_ruled_out(
-    kind: Callable[[int], Iterator[tuple[str, nsg.Scene]]], seed: int
+    kind: Callable[[], Iterator[tuple[str, nsg.Scene]]],
 ) -> None:
     """By the network and, of every other scene, by formulas: true distances' bounds have no slack."""
-    for at, (name, scene) in enumerate(kind(seed)):
+    for at, (name, scene) in enumerate(kind()):
         model = "shapes2d"
         try:
             p = nsg.compile(scene.model_copy(update={"background": None}), model=model)

@@ -61,7 +61,7 @@ def test_distance_equals_a_loop_over_edges(geometry: str) -> None:
 def test_picture_equals_the_slow_loop(name: str) -> None:
     rng = np.random.default_rng(list(name.encode()))
     for _ in range(2):
-        scene = random_scene(rng, SETS[name]).model_copy(update={"canvas": (26, 18)})
+        scene = random_scene(rng, SETS[name]).model_copy(update={"canvas": (16, 12)})
         np.testing.assert_allclose(picture(scene), oracle.draw(scene), atol=1e-6)
 
 
@@ -204,8 +204,8 @@ def test_each_pixel_is_in_one_part_and_meets_few_of_many_objects() -> None:
     text = (
         "for (i in 0..<400) { star { scale(0.03); translate(0.1 * (i % 20) - 1, 0.1 * floor(i / 20) - 1); } }"
     )
-    graph, _ = exact_graph(nsg.loads(f"canvas(320, 240); {text}"))
-    seen, met = np.zeros((240, 320), int), 0
+    graph, _ = exact_graph(nsg.loads(f"canvas(160, 120); {text}"))
+    seen, met = np.zeros((120, 160), int), 0
     for node, rows, columns in parts(graph.root, graph.canvas, None):
         seen[rows.start : rows.stop, columns.start : columns.stop] += 1
         met += len(rows) * len(columns) * sum(1 for _ in leaves(node))

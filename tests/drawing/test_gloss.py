@@ -53,12 +53,12 @@ def test_lobes(rough: float, library: str) -> None:
 
     def answer(axis: np.ndarray, widest: float) -> np.ndarray:
         """The integral of f cos over a cap of the sphere about an axis, finer about the axis."""
-        t = ((np.arange(1500) + 0.5) / 1500)[:, None]
-        c, a = 1 - (1 - widest) * t**3, 2 * pi * (np.arange(400) + 0.5) / 400
+        t = ((np.arange(1000) + 0.5) / 1000)[:, None]
+        c, a = 1 - (1 - widest) * t**3, 2 * pi * (np.arange(200) + 0.5) / 200
         x = np.array([axis[2], 0.0, -axis[0]]) / np.hypot(axis[0], axis[2])
         s, y = np.sqrt(1 - c * c), np.cross(axis, x)
         w = (s * np.cos(a))[..., None] * x + (s * np.sin(a))[..., None] * y + (c + 0 * a)[..., None] * axis
-        part = ((1 - widest) * 3 * t**2 * 2 * pi / 1500 / 400 + 0 * a).reshape(-1, 1)
+        part = ((1 - widest) * 3 * t**2 * 2 * pi / 1000 / 200 + 0 * a).reshape(-1, 1)
         return np.asarray((reflected(rough, rgb, n, v, w.reshape(-1, 3)) * part).sum(0))
 
     sky = Stage(Camera(tuple(eye)), (), None, sky=Sky(1.0, EVEN, EVEN))

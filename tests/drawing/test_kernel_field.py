@@ -24,6 +24,7 @@ from scenelang.language.evaluation import load, loads
 from tests.drawing.solids import (
     LEAVES,
     Object,
+    graph,
     moved,
     random_tree,
     scaled,
@@ -125,6 +126,17 @@ def test_trees(seed: int) -> None:
     for each, most in ((tables, 6e-3), (tables_of(tree_field(tree, CLOSED)), 1e-5)):
         found = KERNEL.field(each, p.astype(np.float32), reach).distance
         assert abs(found.clip(-reach, reach) - truth).max() < most
+
+
+def test_far_objects_are_not_met() -> None:
+    """Each point meets those in its reach."""
+    rng = np.random.default_rng(5)
+    balls = [Object("sphere", (scaled(0.1), moved(*rng.uniform(-2, 2, 3)))) for _ in range(48)]
+    p, reach = rng.uniform(-2.5, 2.5, (3, 4000)), (0.03 * 1.75 ** rng.integers(0, 7, 4000)).astype(np.float32)
+    result = KERNEL.field(tables_of(stream(balls, CLOSED)), p.astype(np.float32), reach)
+    truth = ExactField(graph(balls)).at(p).d
+    assert abs(np.minimum(result.distance, reach) - np.minimum(truth, reach)).max() < 1e-4
+    assert result.met < p.shape[1] * len(balls) / 4
 
 
 def test_textures() -> None:

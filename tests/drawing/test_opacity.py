@@ -99,23 +99,23 @@ def lowered(scene: Scene) -> Any:
 
 def test_the_reference_is_the_formulas() -> None:
     seen = 0
-    for seed in range(25):
+    for seed in range(10):
         rng = RNG(seed)
         graph = lowered(see_through(random_scene(rng, SETS["trees"]), rng))
-        p = rng.uniform(-1, 1, (2, 60))
+        p = rng.uniform(-1, 1, (2, 50))
         big_d, big_q = evaluate(graph.root, p, clear=True)
         for at in range(p.shape[1]):
             d, q = tree_at(graph.root, p[:, at : at + 1])
             assert big_d[at] == pytest.approx(d, abs=1e-12)
             np.testing.assert_allclose(big_q[at], q, atol=1e-12)
             seen += d < 0 and 0.01 < q[3] < 0.99
-    assert seen > 80
+    assert seen > 25
 
 
 def test_passes_keep_what_is_seen_through() -> None:
     """Also unions that were one operand, and rows that a translucent one covers."""
     changed = 0
-    for seed in range(40):
+    for seed in range(20):
         scene = see_through(full_scene(seed), RNG(seed))
         found = stages(scene)
         p = sample_points(scene.canvas, range(scene.canvas[1]), 2)[:, ::7]
@@ -134,7 +134,7 @@ def test_passes_keep_what_is_seen_through() -> None:
             assert ((before < 0) == (after < 0))[look].all(), (seed, name)
             inside = look & (before < 0)
             np.testing.assert_allclose(was[inside], now[inside], atol=1e-7, err_msg=f"{seed} {name}")
-    assert changed > 100
+    assert changed > 50
 
 
 def glass(tokens: list[int], rng: np.random.Generator, widths: Array) -> Program:
@@ -236,7 +236,7 @@ def test_pictures() -> None:
     for seed in range(6):
         rng = RNG([7, seed])
         scene = see_through(random_scene(rng, SETS["trees" if seed % 2 else "textures2d"]), rng)
-        scene = scene.sized((96, 96)).model_copy(update={"background": None if seed % 3 == 0 else "default"})
+        scene = scene.sized((64, 64)).model_copy(update={"background": None if seed % 3 == 0 else "default"})
         program = nsg.compile(scene)
         image = np.asarray(draw(NETWORK, program).image)
         assert abs(image - np.asarray(draw(torch, program).image)).mean() < 2e-4

@@ -99,27 +99,25 @@ def hold(plain: PlainField, seed: int = 0, loose: float = 2e-3) -> None:
     assert (call(plain, "near", p, reach)[0] == d).all()
 
 
-@LIBRARIES
 @pytest.mark.parametrize(
     "name", ["armillary", "bracket", "icecream", "lotus", "floor", "neon", "robot", "teatime", "turned"]
 )
-def test_points_of_shipped_scenes(name: str, library: str) -> None:
-    hold(of(shipped(name), library))
+def test_points_of_shipped_scenes(name: str) -> None:
+    """By torch, as in the next two; `test_kernel_field` holds the kernel to numpy's."""
+    hold(of(shipped(name), "torch"))
 
 
-@LIBRARIES
 @pytest.mark.parametrize("leaf", [*LEAVES, "m.teapot"])
-def test_points_of_leaves_with_skins_and_warps(leaf: str, library: str) -> None:
+def test_points_of_leaves_with_skins_and_warps(leaf: str) -> None:
     operands = " smooth ".join(f"{leaf} {{ {own} }}" for own in OWN)
     text = f'nsg 1; import "std/meshes" as m; camera(eye = [0, 1, 9]); chain {{ {operands} }}'
-    hold(of(compile_scene(loads(text)), library), loose=0.03)
+    hold(of(compile_scene(loads(text)), "torch"), loose=0.03)
 
 
-@LIBRARIES
 @pytest.mark.parametrize("seed", range(6))
-def test_points_of_trees(seed: int, library: str) -> None:
+def test_points_of_trees(seed: int) -> None:
     """Groups in groups, cuts with rounded edges, media among solids; what is opaque alone, too."""
-    plain = again(tree_field(random_tree(np.random.default_rng(seed), 4, (0.0, 0.5)[seed % 2])), library)
+    plain = again(tree_field(random_tree(np.random.default_rng(seed), 4, (0.0, 0.5)[seed % 2])), "torch")
     hold(plain, seed)
     apart = plain.opaque(0.3)
     assert isinstance(apart, PlainField)
@@ -192,12 +190,10 @@ def rays(program: nsg.Program) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     return eyes, ways, np.full(ways.shape[1], 12.0, np.float32)
 
 
-@pytest.mark.parametrize(
-    ("name", "library"),
-    [*zip(["bracket", "castle", "fog", "lantern", "teatime", "turned"], [*NETS] * 3, strict=True)],
-)
-def test_rays_are_the_kernels(name: str, library: str) -> None:
-    plain, given = of(shipped(name), library), rays(shipped(name))
+@pytest.mark.parametrize("name", ["castle", "lantern", "turned"])
+def test_rays_are_the_kernels(name: str) -> None:
+    """By torch; `test_kernel_rays` has numpy's."""
+    plain, given = of(shipped(name), "torch"), rays(shipped(name))
     expected = KERNEL.rays(tables_of(plain), *given, gap=GAP)
     hit, length, soft, depth, _, work = call(plain, "march", *given, gap=GAP)
     assert (np.isfinite(hit) == np.isfinite(expected.hit)).mean() > 0.998
@@ -248,7 +244,7 @@ def test_pieces_of_media(media: Any, library: str) -> None:
     assert (begin[later + 1] >= end[later]).all()
     taken = sigma * (before + end - begin)
     assert (sigma * before)[later + 1] == pytest.approx(taken[later], abs=1e-4)
-    tables, some, count = tables_of(plain), np.flatnonzero(length > 0.2)[::10], 1000
+    tables, some, count = tables_of(plain), np.flatnonzero(length > 0.2)[::25], 1000
 
     def register(ray: np.ndarray, t: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Colours and extinctions (4, K), and a mask of media (K,)."""
@@ -299,17 +295,6 @@ def test_lamps_are_shown_as_rays_show_them(name: str, library: str) -> None:
     assert abs(share - truth).mean() < 0.02
     assert np.quantile(abs(share - truth), 0.95) < 0.1
     assert work.near > 0
-
-
-def test_both_libraries_show_the_same() -> None:
-    found = []
-    for library in NETS:
-        apart, rng = of(shipped("bracket"), library).opaque(0.6), np.random.default_rng(4)
-        p = np.stack([rng.uniform(-2, 2, 300), np.full(300, -1.3), rng.uniform(-2, 2, 300)])
-        given = [part.astype(np.float32) for part in (p, np.repeat([[0.0], [1.0], [0.0]], 300, 1))]
-        found.append(call(apart, "shown", np.array([1.0, 3.0, 1.0], np.float32), 0.5, *given)[0])
-    assert (abs(found[0] - found[1]) > 1e-3).mean() < 0.02
-    assert np.ptp(found[0]) > 0.5
 
 
 @pytest.mark.parametrize("text", ["", "light([1, 3, 2], radius = 0.4);"])

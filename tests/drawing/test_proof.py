@@ -50,7 +50,7 @@ def test_no_pixel_breaks_its_proof(name: str) -> None:
         (7, 19, 24, 36) if made else range(1 if name == "crowd" else 2)
     ):  # the boolean rule refuses others
         scene = made(seed) if made else sets[name](RNG([7, seed]))
-        look: dict[str, Any] = {"background": [(0.9, 0.1, 0.4), None][index % 2], "canvas": (77, 59)}
+        look: dict[str, Any] = {"background": [(0.9, 0.1, 0.4), None][index % 2], "canvas": (53, 41)}
         scene = scene.model_copy(update=look)
         image, proof = nsg.prove(scene)
         assert broken(scene, image, proof) == 0

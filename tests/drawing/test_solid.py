@@ -155,7 +155,7 @@ SCENES: dict[str, tuple[Fold, Stage]] = {
 @pytest.mark.parametrize("name", SCENES)
 def test_picture_equals_the_slow_loop(name: str) -> None:
     root, stage = SCENES[name]
-    canvas = (6, 5)
+    canvas = (4, 3)
     slow = np.array(solid_oracle.draw(root, stage, canvas))
     fast = np.asarray(solid_image(root, stage, canvas))
     np.testing.assert_allclose(fast, slow, atol=6e-3)
@@ -196,7 +196,7 @@ def test_povray_draws_meshes_the_same() -> None:
         ("subtract", leaf("sphere", "diffuse", RED, scaled(0.5), moved(-0.9, 0.2, 0.5))),
         leaf("sphere", "diffuse", RED, scaled(0.3), moved(0.3, -0.6, 0.7)),
     )
-    assert_povray_agrees(root, Stage(), (60, 60), 48, brought={"ring": shape})
+    assert_povray_agrees(root, Stage(), (40, 40), 48, brought={"ring": shape})
 
 
 def test_an_eye_in_a_solid_sees_nothing() -> None:
@@ -257,11 +257,11 @@ def test_no_ray_passes_through_what_is_warped() -> None:
 def test_finer_steps_change_nothing_to_be_seen(monkeypatch: pytest.MonkeyPatch) -> None:
     """By more than 60 dB: what the language asks of light in media."""
     root, stage = SCENES["media"]
-    usual = np.asarray(solid_image(root, stage, (32, 24)))
+    usual = np.asarray(solid_image(root, stage, (10, 8)))
     monkeypatch.setattr(solid, "TOLERANCE", solid.TOLERANCE / 20)
     monkeypatch.setattr(solid, "HALVINGS", solid.HALVINGS + 3)
     monkeypatch.setattr(solid, "STEP", solid.STEP / 2)
-    assert psnr_db(usual, np.asarray(solid_image(root, stage, (32, 24)))) > 60
+    assert psnr_db(usual, np.asarray(solid_image(root, stage, (10, 8)))) > 60
 
 
 def test_a_light_inside_a_solid_lights_nothing_outside() -> None:

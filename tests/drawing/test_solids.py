@@ -17,7 +17,7 @@ from scenelang.output.frontier import plan_of
 from tests.pictures import psnr_db
 
 TEXT = """nsg 1;
-canvas(72, 48);
+canvas(48, 32);
 animate(seconds = 1, fps = 3);
 let mist = material volumetric { color([0.3, 0.5, 1.0]); };
 module ball(at, c = #e8c060) {
@@ -51,7 +51,7 @@ def test_the_network_draws_what_the_reference_does(
     scene: nsg.Scene, program: Program, exact: nsg.Image, tmp_path: Path
 ) -> None:
     picture = nsg.render(scene)
-    assert picture.shape == (48, 72, 3)
+    assert picture.shape == (32, 48, 3)
     assert psnr_db(picture, exact) > 42
     assert np.array_equal(nsg.render(program), picture)
     program.save(tmp_path / "p.safetensors")
@@ -65,17 +65,17 @@ def test_samples_and_backgrounds(scene: nsg.Scene, exact: nsg.Image) -> None:
     assert psnr_db(four.image, exact) > 42
     assert 20 < psnr_db(one.image, exact) < psnr_db(four.image, exact)
     assert one.pairs < few.pairs
-    assert [one.refined, four.refined] == [0, 72 * 48]
+    assert [one.refined, four.refined] == [0, 48 * 32]
     assert 0 < few.refined < four.refined
     quick = draw_small(program, samples="quick")
     assert psnr_db(one.image, exact) < psnr_db(quick.image, exact)
     assert one.pairs < quick.pairs < 0.8 * few.pairs
     assert quick.refined < few.refined
     clear = scene.model_copy(update={"background": None})
-    draft, half = nsg.render(clear, samples="draft"), nsg.render(clear, samples="one", size=(36, 24))
-    assert np.array_equal(draft, enlarged(half, (72, 48)))
+    draft, half = nsg.render(clear, samples="draft"), nsg.render(clear, samples="one", size=(24, 16))
+    assert np.array_equal(draft, enlarged(half, (48, 32)))
     ours, theirs = nsg.render(clear), nsg.render(clear, backend="reference")
-    assert ours.shape == theirs.shape == (48, 72, 4)
+    assert ours.shape == theirs.shape == (32, 48, 4)
     assert abs(np.asarray(ours)[..., 3] - np.asarray(theirs)[..., 3]).mean() < 2e-3
 
 
@@ -96,7 +96,7 @@ def test_plans_of_solids(scene: nsg.Scene, program: Program) -> None:
     assert found["rows"] == 4
     cost, drawing = found["drawing"], draw_small(program, threads=1)
     assert cost["psnr"] > 40
-    assert cost["rays"] == 72 * 48 + 4 * cost["refined"]
+    assert cost["rays"] == 48 * 32 + 4 * cost["refined"]
     assert cost["light_rays"] > 0
     assert cost["near"] < cost["steps"] < cost["evaluations"] == drawing.pairs
     assert "meetings" not in cost

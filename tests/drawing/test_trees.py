@@ -111,9 +111,9 @@ def test_pictures_of_trees_are_those_of_the_reference() -> None:
     learned, closed = [], []
     for seed in range(4):
         tree = tree_of(seed)
-        exact = solid_image(tree_graph(tree), STAGE, (48, 48))
+        exact = solid_image(tree_graph(tree), STAGE, (28, 28))
         for found, net in ((learned, network()), (closed, CLOSED)):
-            found.append(min(50.0, psnr_db(draw_solids(tree_field(tree, net), STAGE, (48, 48))[0], exact)))
+            found.append(min(50.0, psnr_db(draw_solids(tree_field(tree, net), STAGE, (28, 28))[0], exact)))
     assert np.mean(learned) > 47
     assert min(closed) > 43
 

@@ -44,7 +44,7 @@ def test_schemas_are_schemas() -> None:
 def test_examples_are_valid() -> None:
     for path in EXAMPLES:
         text = to_readable_json(nsg.load(path))
-        if len(text) < 20_000:  # the others hold more of the same
+        if len(text) < 8_000:  # the others hold more of the same
             SCENE.validate(json.loads(text))
 
 
@@ -85,7 +85,7 @@ def damaged(data: Any, rng: random.Random) -> Any:
     return data
 
 
-@settings(max_examples=80)
+@settings(max_examples=40)
 @given(scenes, st.integers(0, 2**32 - 1))
 def test_schema_and_reader_agree_on_scenes_and_damage(scene: nsg.Scene, seed: int) -> None:
     data = json.loads(scene.to_json())

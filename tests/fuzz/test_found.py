@@ -143,7 +143,7 @@ FORMER = (
 
 def read_long_texts() -> None:
     """Read texts that once took minutes; the last one named is the one that still does."""
-    for pumped, letters in ((LONG, 200_000), (FORMER, 100_000)):
+    for pumped, letters in ((LONG, 100_000), (FORMER, 50_000)):
         for pump in pumped:
             print(pump, flush=True)
             READERS[pump.reader](pump.text(letters))

@@ -23,8 +23,8 @@ FOUND = Path(__file__).parent / "found"
 COUNTS = {
     "parse": (40, 60),
     "evaluate": (40, 60),
-    "scene_json": (40, 120),
-    "program": (15, 120),
+    "scene_json": (20, 40),
+    "program": (6, 40),
     "weights": (20, 250),
     "formatting": (40, 50),
     "zoo": (20, 150),

@@ -61,7 +61,7 @@ def test_python_learns_what_the_command_does(folder: Path) -> None:
 
 def test_learn_adds_to_a_file_and_a_scene_draws_it(folder: Path) -> None:
     about = ("--license", "CC0", "--source", "https://example.org")
-    assert run("a-ball.ply", "-o", "zoo.safetensors", *about)[0] == 0
+    assert run("a-ball.ply", "-o", "zoo.safetensors", "--max-error", "0.001", *about)[0] == 0
     before = load_element_file("zoo.safetensors").geometries["a_ball"]
     asked = ("--max-error", "0.01", "--preview", "preview.png")
     code, output = run("2 boxes.stl", "star.svg", "-o", "zoo.safetensors", *asked)
@@ -117,18 +117,19 @@ def test_what_was_finished_is_kept_and_not_made_again(folder: Path, monkeypatch:
 
     monkeypatch.setattr(learning.SandboxProcess, "__call__", stopped)
     files, stops = ["star.svg", "a-ball.ply"], "a_ball"
+    usual = LearnOptions(max_error=0.01)
     with pytest.raises(KeyboardInterrupt):
-        learn_files(files, "z.safetensors")
+        learn_files(files, "z.safetensors", usual)
     assert list(load_element_file("z.safetensors").geometries) == ["star"]
     stops = ""
-    learn_files(files, "z.safetensors")
+    learn_files(files, "z.safetensors", usual)
     assert fitted == ["star", "a_ball", "a_ball"]
     whole = Path("z.safetensors").read_bytes()
     for options, again in (
-        (LearnOptions(), 0),
+        (usual, 0),
         (LearnOptions(license="MIT", max_error=0.02), 1),
         (LearnOptions(max_error=1e-9, steps=1), 1),
-        (LearnOptions(), 1),
+        (usual, 1),
     ):
         fitted.clear()
         learn_files(["a-ball.ply"], "z.safetensors", options)
@@ -249,7 +250,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
     (tmp_path / "car.glb").write_bytes(car)
     out = tmp_path / "zoo.safetensors"
     said: list[str] = []
-    made = learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
+    made = learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=1, parts=True), say=said.append)
     zoo = load_element_file(out)
     assert {*zoo.geometries} == {"car", *(part.geometry for part in zoo.groups["car"])}
     assert {element.name for element in made} == {*zoo.geometries}
@@ -258,7 +259,7 @@ def test_what_is_learned_says_which_part_it_is(car: bytes, tmp_path: Path) -> No
         points, *_ = shape.surface(100)
         assert abs(shape.distances(points)).max() < 1e-6
         assert shape.size == pytest.approx(element.about["size"]), name
-    learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=2, parts=True), say=said.append)
+    learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=1, parts=True), say=said.append)
     assert said[-1] == "car: made before of this file"
     learn_files([tmp_path / "car.glb"], out, LearnOptions(steps=1))
     assert load_element_file(out).groups["car"] == (Part("car", (0, 0, 0), 1.0, (), (), "car"),)

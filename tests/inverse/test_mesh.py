@@ -444,7 +444,7 @@ def test_a_cube_is_drawn_as_by_its_formula(learned: Path) -> None:
         "  translate(0.4, 0.3, 0); material diffuse { color(#69c); } } subtract torus { scale(0.7); } }",
         "zoo.cube { displace(0.05, 8); twist(0.8); scale(0.7); material volumetric { color(#9c6); } }",
     ):
-        shown = scene(learned, text)
+        shown = scene(learned, text).sized((24, 24))
         graph = exact_graph(shown)[0]
         exact = reference_image(graph, brought={"zoo.cube": Cube()})
         assert psnr_db(np.asarray(nsg.render(shown, backend="reference")), np.asarray(exact)) > 60

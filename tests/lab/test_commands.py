@@ -139,23 +139,23 @@ def test_everything_runs_at_its_smallest(tmp_path: Path, monkeypatch: pytest.Mon
 def test_figures_of_solids_are_those_of_the_pictures_users_get(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    asked = ["eval", "solids3d", "--set", "staged", "--scenes", "3", "--side", "24", "--seed", "4"]
+    asked = ["eval", "solids3d", "--set", "staged", "--scenes", "2", "--side", "16", "--seed", "4"]
     asked += ["--kept", str(tmp_path / "kept")]
     done = run(*asked, "-o", ".")
     assert done.exit_code == 0, done.output
     found = json.loads((tmp_path / "staged.json").read_text("utf-8"))
-    assert found["canvas"] == [24, 24]
+    assert found["canvas"] == [16, 16]
     (tmp_path / "staged.json").unlink()
     kept = sorted((tmp_path / "kept").iterdir())
-    assert len(kept) == 3
+    assert len(kept) == 2
     with monkeypatch.context() as without:
         without.setattr("lab.evaluate.reference_of", None)  # nothing is drawn again
         assert run(*asked, "-o", ".").exit_code == 0
     again = json.loads((tmp_path / "staged.json").read_text("utf-8"))
     assert (again["psnr_uncapped"], again["ssim"]) == (found["psnr_uncapped"], found["ssim"])
-    scene_at = scenes_of(load_model("solids3d"), "staged", 4, 24)
+    scene_at = scenes_of(load_model("solids3d"), "staged", 4, 16)
     told = []
-    for index in range(3):
+    for index in range(2):
         text = nsg.loads(scene_at(index).to_nsg())
         network, exact = (
             np.asarray(nsg.render(text, backend=way), np.float64) for way in ("neural", "reference")

@@ -114,7 +114,7 @@ def test_probes_vary_one_thing() -> None:
 
 def test_what_holds_of_any_scene(model: Model, solids: Model) -> None:
     assert order_of_disjoint(model, 1, 4)["largest_difference"] < 1 / 255
-    small = dataclasses.replace(solids, manifest=dataclasses.replace(solids.manifest, sizes=((32, 32),)))
+    small = dataclasses.replace(solids, manifest=dataclasses.replace(solids.manifest, sizes=((16, 16),)))
     assert order_of_disjoint(small, 1, 4)["largest_difference"] < 1 / 255
     assert arithmetic(small, 1, 4)["threads"] < 1 / 255
     assert 0 < flicker(small, 1, 4)["mean"] < 0.5  # few pixels, each of one sample

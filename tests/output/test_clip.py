@@ -43,7 +43,7 @@ def test_frames_are_what_they_are_alone() -> None:
 @pytest.mark.parametrize("path", examples(), ids=lambda path: path.stem)
 def test_frames_of_examples(path: Path) -> None:
     frames = Clip(Source(path)).animation.frames
-    compare(SourceFile(str(path), path.read_text("utf-8")), path, max(1, frames // 5))
+    compare(SourceFile(str(path), path.read_text("utf-8")), path, max(1, frames // 3))
 
 
 def test_imports_are_read_once(tmp_path: Path) -> None:

@@ -31,6 +31,7 @@ from scenelang.output import painting as ours
 from scenelang.output import workers
 from scenelang.output.animate import Progress
 from scenelang.output.workers import Connection, GivenUp, by_workers
+from tests.inverse.fewer import settle_by_fewer
 from tests.output.scenes import DARK, HEAD
 
 
@@ -347,6 +348,7 @@ def backwards(
 
 def test_who_is_first_has_no_say(folder: Path, monkeypatch: pytest.MonkeyPatch) -> None:
     """A part of one file has the name of another, which comes later and so takes its place."""
+    settle_by_fewer(monkeypatch)
     scene = trimesh.Scene()
     for name, place in (("body", 0), ("roof", 5)):
         box = trimesh.creation.box((1, 2, 3 + place))
