@@ -8,7 +8,7 @@
 enum { UNION_ = 1, SHOWN = 2, WILD = 4, SMOOTHS = 8, CUTS = 16 };  // flags of joints and objects
 enum { TRACED = 1, PAINTED = 2, OWNED = 4 };  // what a fold is asked
 enum { ADAPTIVE, EVERY, SINGLE, OWNERS };  // ways to ask
-enum { UNITS_2D = NORMS, OUTLINE = 5, CELLS_2D = 48, ALL_CELLS = 0xffff };
+enum { UNITS_2D = NORMS, OUTLINE = 5, ALL_CELLS = 0xffff };
 #define FARTHEST_AWAY 1e15f  // leaf units: where points lie that float32 cannot follow
 #define LEAST_SHARE 1e-4f  // of a colour, that counts as part of what a point shows
 #define FLAT_COLOUR 1e-4f  // of a channel: a block that is known so well has one colour
@@ -119,15 +119,43 @@ static ONCE F units_rise(const Leaf *n, P q, F radius) {
     F rise = max2(best[2] + inside[2] - ends[0][0] - d, d - (best[0] + inside[0] - ends[0][2]));
     return sel(rise >= 0.0f, rise, all(BIG));
 }
-// Outlines: the nearest chord of those in the lists of the points' cells, and two steps of Newton's method to the nearest
-// point of its curve, see scenelang/drawing/neural/outlines.py. A piece has 16 floats.
+// Outlines, see scenelang/drawing/neural/outlines.py. A piece has 16 floats.
+IN F outline_step(const F *c, F t, P q) {  // of Newton's method towards the nearest point of a curve
+    F dx = c[0] + t * (c[2] + t * c[4]) - q.x, dy = c[1] + t * (c[3] + t * c[5]) - q.y;
+    F vx = c[2] + 2 * t * c[4], vy = c[3] + 2 * t * c[5];
+    F speed = vx * vx + vy * vy, bend = max2(speed + 2 * (dx * c[4] + dy * c[5]), 0.25f * speed);
+    return clamp(t - (dx * vx + dy * vy) / max2(bend, all(1e-12f)), 0, 1);
+}
+IN M on_left(P way, F x, F y) { return way.x * y - way.y * x >= 0.0f; }
+// Inside is where the winding number is not 0: that of the cell's post, and what is crossed on the way from there.
+static ONCE M outline_inside(const Leaf *n, P q, M cell) {
+    int cells = n->side * n->side;
+    F px = gather(n->posts, cell), py = gather(n->posts + cells, cell), turns = gather(n->posts + 2 * cells, cell);
+    P way = {q.x - px, q.y - py};
+    for (int lane = 0; lane < W; lane++) {
+        int known = 0;
+        for (int before = 0; before < lane; before++) known |= cell[before] == cell[lane];
+        if (known) continue;
+        M own = cell == ints(cell[lane]);
+        for (int k = n->begins[cell[lane]]; k < n->begins[cell[lane] + 1]; k++) {
+            const float *c = n->data + 16 * (size_t)(n->passing[k] / 2);
+            F vx = q.x - c[0], vy = q.y - c[1], off = vx * c[5] - vy * c[4], side = vy * c[10] - vx * c[11];
+            M left = side >= 0.0f, post = ints(-(n->passing[k] & 1));
+            M crossed = (on_left(way, c[0] - px, c[1] - py) ^ on_left(way, c[6] - px, c[7] - py)) & (left ^ post) & own;
+            float bent = c[10] * c[5] - c[11] * c[4];  // between chord and curve
+            M within = (left ^ ints(-(bent > 0))) & (off * off < bent * (side + off)) & own;
+            turns += sel(crossed, sel(left, all(1), all(-1)), all(0)) - sel(within, sel(left, all(1), all(-1)), all(0));
+        }
+    }
+    return (turns < -0.5f) | (turns > 0.5f);
+}
 static ONCE F outline_distance(const Leaf *n, P p) {
     F radius = length2(p.x, p.y), shrunk = LAST / max2(radius, all(LAST));
     P q = {p.x * shrunk, p.y * shrunk};
     F x = clamp(q.x, -1, 1) * (WIDTH_2D - (WIDTH_2D - 1) / max2(size_of(q.x), all(1)));
     F y = clamp(q.y, -1, 1) * (WIDTH_2D - (WIDTH_2D - 1) / max2(size_of(q.y), all(1)));
-    M column = cut(clamp((x + WIDTH_2D) * (CELLS_2D / (2 * WIDTH_2D)), 0, CELLS_2D - 1));
-    M cell = cut(clamp((y + WIDTH_2D) * (CELLS_2D / (2 * WIDTH_2D)), 0, CELLS_2D - 1)) * CELLS_2D + column;
+    float finer = n->side / (2 * WIDTH_2D), last = n->side - 1;
+    M column = cut(clamp((x + WIDTH_2D) * finer, 0, last)), cell = cut(clamp((y + WIDTH_2D) * finer, 0, last)) * n->side + column;
     uint64_t seen[OUTLINE_WORDS];  // pieces that were asked, of this and each further part of them
     F least = all(1e30f), t = all(0);
     M best = ints(0);
@@ -144,27 +172,24 @@ static ONCE F outline_distance(const Leaf *n, P p) {
             }
             const float *c = n->data + 16 * (size_t)piece;
             F dx = q.x - c[0], dy = q.y - c[1], at = clamp((dx * c[10] + dy * c[11]) * c[12], 0, 1);
-            dx -= at * c[10]; dy -= at * c[11];
+            if (c[4] != 0 || c[5] != 0) {
+                F own[6];
+                for (int e = 0; e < 6; e++) own[e] = all(c[e]);
+                at = outline_step(own, at, q);
+            }
+            dx -= at * (c[2] + at * c[4]); dy -= at * (c[3] + at * c[5]);
             F off = dx * dx + dy * dy;
             M nearer = (off < least) | ((off == least) & (piece < best));
             least = sel(nearer, off, least); t = sel(nearer, at, t);
             best = (ints(piece) & nearer) | (best & ~nearer);
         }
     }
-    F c[10];
-    for (int k = 0; k < 10; k++) c[k] = gather(n->data + k, best * 16);
-    F dx, dy, vx, vy;
-    for (int k = 0;; k++) {
-        dx = c[0] + t * (c[2] + t * c[4]) - q.x; dy = c[1] + t * (c[3] + t * c[5]) - q.y;
-        vx = c[2] + 2 * t * c[4]; vy = c[3] + 2 * t * c[5];
-        if (k == 2) break;
-        F speed = vx * vx + vy * vy, bend = max2(speed + 2 * (dx * c[4] + dy * c[5]), 0.25f * speed);
-        t = clamp(t - (dx * vx + dy * vy) / max2(bend, all(1e-12f)), 0, 1);
-    }
-    M begins = t <= 0.0f, stops = t >= 1.0f;
-    vx = sel(begins, c[6], sel(stops, c[8], vx)); vy = sel(begins, c[7], sel(stops, c[9], vy));
+    F c[6];
+    for (int k = 0; k < 6; k++) c[k] = gather(n->data + k, best * 16);
+    t = outline_step(c, t, q);
+    F dx = c[0] + t * (c[2] + t * c[4]) - q.x, dy = c[1] + t * (c[3] + t * c[5]) - q.y;
     F away = length2(dx, dy);
-    return sel(vy * dx - vx * dy > 0.0f, -away, away) + above(radius - LAST);
+    return sel(outline_inside(n, q, cell), -away, away) + above(radius - LAST);
 }
 // Grids of distances over [-1, 1]², and beyond as `GridShape` and `GrownShape` of scenelang/drawing/neural/assets.py.
 IN F flat_grid_at(const Leaf *n, P q) {

@@ -90,10 +90,12 @@ typedef struct {  // an object of the plane
 typedef struct {
     int32_t kind;
     int32_t units, size[UNITS + 1], inner, features, feature[FEATURES_2D];  // lines of the notch, and of each unit
-    int32_t width;  // nodes along an axis of a grid, or pieces of an outline
+    int32_t width, side;  // nodes along an axis of a grid, or pieces of an outline, and cells along an axis of its grid
     float radius, slope, line[LINES][LINE_2D], steep[LINES], whole[UNITS + 1];  // bounds on how fast all these change
     const float *data;
     const int32_t *first, *near;  // where the list of each of an outline's cells begins, and the lists of pieces
+    const float *posts;  // of each cell a point, x and y, and its winding number, in three rows
+    const int32_t *begins, *passing;  // the same of pieces that pass it, as twice their number, and 1 where its post is left
 } Leaf;
 typedef struct { int32_t flags; float own[3], past[3], bias[3], candidate, bump, width, stretch; } Joint;  // a cell
 typedef struct {

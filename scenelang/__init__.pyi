@@ -52,6 +52,8 @@ from scenelang.language.nodes import Stop as Stop
 from scenelang.language.nodes import Translate as Translate
 from scenelang.language.nodes import Twirl as Twirl
 from scenelang.language.nodes import Twist as Twist
+from scenelang.language.nodes import polygon as polygon
+from scenelang.language.nodes import spline as spline
 from scenelang.language.reports import SceneError as SceneError
 from scenelang.language.scene import Elements as Elements
 from scenelang.language.scene import Scene as Scene

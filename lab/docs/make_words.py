@@ -24,7 +24,8 @@ TABLES = {
     "Definitions": {word: words.DECLARING[word] for word in ("let", "param", "fn", "module", "import")},
     "Settings": {**{word: words.DECLARING[word] for word in ("nsg", "model")}, **words.SETTINGS},
     "Transforms": words.TRANSFORMS,
-    "Geometries": {name: words.Word(name, name, text) for name, text in words.GEOMETRIES.items()},
+    "Geometries": {name: words.Word(name, name, text) for name, text in words.GEOMETRIES.items()}
+    | words.OUTLINES,
     "Texture": {name: word for name, word in words.OPERATIONS.items() if name not in words.TRANSFORMS},
 }
 KEYWORDS = {

@@ -4,11 +4,14 @@ from __future__ import annotations
 
 import bz2
 import hashlib
+import struct
 import zlib
 from collections import Counter
 from collections.abc import Iterable, Mapping
 from dataclasses import dataclass, field
+from functools import lru_cache
 from itertools import pairwise
+from math import hypot, isfinite
 from typing import Any, ClassVar, Final, NamedTuple
 
 from scenelang.assets.records import Record
@@ -18,11 +21,16 @@ MOST_SIDE: Final = {2: 1025, 3: 193}  # nodes along an axis, by dimension
 MOST_PIXELS: Final = 2048  # along a side of a picture
 MOST_CURVES: Final = 5000  # of an outline
 GRAIN: Final = 32767  # steps in a radius of an outline
+POINTS: Final = range(3, 1001)  # how many a polygon or a spline may have
 ROOM: Final = 12  # bytes of a curve
 TEXELS: Final = 256  # along the longer side of one that is learned, where nothing else is asked
 
 Facts = dict[str, str | float]
 """Facts of an element from its maker: text and numbers by name."""
+
+
+BY_POINTS: Final = "polygon", "spline"
+"""Forms of what a scene draws by points; a Program's file has their index here."""
 
 
 class Encoding(NamedTuple):
@@ -43,6 +51,10 @@ FORMS: Final = {
     # a geometry: closed outlines of quadratic curves in the unit disc, which have the inside on their left:
     # 16-bit numbers of a start, a control point and an end, in 1 / `GRAIN`
     "outline": Encoding({"curves": range(1, MOST_CURVES + 1)}, ("plain",), {2: "element of the plane"}),
+    # geometries: closed, by points in the unit disc, two float64 numbers each, a spline `splined`. No
+    # file of elements has them
+    "polygon": Encoding({"points": POINTS}, ("plain",), {2: "element of the plane"}),
+    "spline": Encoding({"points": POINTS}, ("plain",), {2: "element of the plane"}),
     # a material: colours over [-1, 1]^2, repeated with period 2 (`scenelang.assets.picture`)
     "picture": Encoding(
         dict.fromkeys(("height", "width"), range(1, MOST_PIXELS + 1)), ("webp", "av1"), {2: "texture"}
@@ -63,8 +75,8 @@ class Element:
         form: one of `FORMS`.
         sizes: its numbers, as the form has them. A pyramid has its dimension (2 or 3), the cells of its
             coarsest grid along an axis, and grids, each of twice as many cells as the one before; an outline
-            its curves; a picture height and width in texels; colours nodes along an axis, and steps from dark
-            to light.
+            its curves, a polygon or a spline its points; a picture height and width in texels; colours nodes
+            along an axis, and steps from dark to light.
         coding: of its bytes, one of the form's.
         data: the bytes.
         about: facts from its maker: license, source, errors; text and numbers by name.
@@ -88,6 +100,21 @@ class Element:
     def material(self) -> bool:
         """True of a material, false of a geometry."""
         return self.form in ("picture", "colours")
+
+    @property
+    def curved(self) -> bool:
+        """True of a geometry by its edges or curves, whose distances are computed."""
+        return self.form == "outline" or self.form in BY_POINTS
+
+    @property
+    def called(self) -> str:
+        """The word of a polygon or a spline, else its name."""
+        return self.form if self.form in BY_POINTS else self.name
+
+    @property
+    def points(self) -> Points:
+        """The points of a polygon or a spline."""
+        return tuple(struct.iter_unpack("<2d", self.inflated()))
 
     @property
     def credited(self) -> str:
@@ -130,8 +157,9 @@ class Element:
 
     def told(self) -> str:
         """Kind, sizes and facts of the element, a line each."""
-        what = "curves" if self.form == "outline" else "colours" if self.material else "distances"
-        plain = self.form in ("outline", "picture")
+        what = "colours" if self.material else "distances"
+        what = next(iter(FORMS[self.form].sizes)) if self.curved else what
+        plain = self.curved or self.form == "picture"
         sides = self.sizes[::-1] if plain else (self.sides[-1],) * self.dimension
         first = f"{self.kind}: {' × '.join(map(str, sides))} {what}, {len(self.data):,} bytes"
         return "\n".join([first, *(f"{key}: {value}" for key, value in self.about.items())])
@@ -152,8 +180,8 @@ class Element:
     @property
     def held(self) -> int:
         """Bytes that it takes unpacked, one a distance or a channel."""
-        if self.form == "outline":
-            return ROOM * self.sizes[0]
+        if self.curved:
+            return (ROOM if self.form == "outline" else 16) * self.sizes[0]
         if self.form == "picture":
             return 3 * self.sizes[0] * self.sizes[1]
         nodes: int = sum(side**self.dimension for side in self.sides)
@@ -171,6 +199,69 @@ class Element:
         if len(result) != self.held or not inflate.eof or inflate.unused_data:
             raise TensorError(f"element `{self.name}` does not hold {self.held:,} bytes")
         return result
+
+
+Points = tuple[tuple[float, float], ...]
+
+
+def settled(points: Points) -> Points:
+    """Points of a closed polygon or spline without those that repeat the one before."""
+    return tuple([p for at, p in enumerate(points) if p != points[at - 1]])
+
+
+def points_fault(points: Points, count: int | None = None) -> str | None:
+    """Say why points, ``count`` of them, make no polygon or spline, None where they do."""
+    count = len(points) if count is None else count
+    if not all(map(isfinite, (x for p in points for x in p))):
+        return "a point that is not finite"
+    if count not in POINTS:
+        return f"{count:,} points, where {POINTS[0]} to {POINTS[-1]:,} are allowed"
+    if len({*points}) < POINTS[0]:
+        return (
+            f"{len({*points})} different point{'s' * (len({*points}) > 1)}, at least {POINTS[0]} are needed"
+        )
+    x, y = points[0]
+    u, v = max(((p - x, q - y) for p, q in points), key=lambda way: hypot(*way))
+    far, most = hypot(u, v), max(abs(x) for p in points for x in p)
+    thin = far * 1e-12 + most * 2.0**-50  # what rounding leaves of a line
+    if all(abs(u / far * (q - y) - v / far * (p - x)) <= thin for p, q in points):
+        return "points that all lie on a line"
+    return None
+
+
+def splined(points: Points) -> list[Points]:
+    """Cubic curves, by four points each, of the closed uniform Catmull-Rom spline through points."""
+    result: list[Points] = []
+    for at, (x, y) in enumerate(points):
+        (a, b), (p, q), (u, v) = points[at - 1], points[at + 1 - len(points)], points[at + 2 - len(points)]
+        result.append(
+            ((x, y), (x + (p - a) / 6, y + (q - b) / 6), (p - (u - x) / 6, q - (v - y) / 6), (p, q))
+        )
+    return result
+
+
+def element_of(form: str, points: Iterable[Iterable[float]]) -> Element:
+    """The element of a polygon or a spline by points of the unit disc."""
+    numbers = [number for point in points for number in point]
+    data = struct.pack(f"<{len(numbers)}d", *numbers)
+    name = f"{form}_{hashlib.sha256(data).hexdigest()[:16]}"
+    return Element(name, form, (len(numbers) // 2,), "plain", data)
+
+
+@lru_cache(maxsize=1 << 12)
+def drawn_element(form: str, points: Points) -> tuple[Element, tuple[float, float], float]:
+    """The element of a polygon or a spline by points without `points_fault`, middle and radius of its disc.
+
+    The middle is the origin where that costs little: deformations then trade places with the scale.
+    """
+    points = settled(points)
+    around = points if form == "polygon" else [p for curve in splined(points) for p in curve]
+    (left, right), (low, high) = ((min(axis), max(axis)) for axis in zip(*around, strict=True))
+    x, y = left / 2 + right / 2, low / 2 + high / 2
+    radius, about = (max(hypot(p - at, q - up) for p, q in around) for at, up in ((x, y), (0.0, 0.0)))
+    if about <= 1.25 * radius:
+        x, y, radius = 0.0, 0.0, about
+    return element_of(form, [((p - x) / radius, (q - y) / radius) for p, q in points]), (x, y), radius
 
 
 def credit_of(elements: Iterable[Element]) -> str:

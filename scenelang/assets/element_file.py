@@ -284,7 +284,7 @@ def _element(name: str, entry: Any, tensor: Tensor, body: memoryview) -> Element
     if not (name.isascii() and name.isidentifier()):
         raise TensorError(f"an element has the name {name[:40]!r}")
     form = FORMS.get(str(entry.get("form"))) if isinstance(entry, dict) else None
-    if form is None:
+    if form is None or "points" in form.sizes:
         raise TensorError(f"element `{name}` has a form that this version does not know")
     check_fields(entry, {"form": str, "about": dict, "coding?": str, **form.sizes}, f"element `{name}`")
     coding = entry.get("coding", form.codings[0])

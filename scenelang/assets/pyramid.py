@@ -25,7 +25,7 @@ from typing import Final
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import GRAIN, MOST_SIDE, Element, Facts
+from scenelang.assets.element import GRAIN, MOST_SIDE, Element, Facts, splined
 
 Grid = npt.NDArray[np.float32]  # of colours (3, n, n, n)
 FINE: Final = 24.0  # steps in a cell's side near the surface
@@ -35,6 +35,7 @@ NEAR: Final = 2.0  # within so many cells of the surface
 FAR: Final = 8.0
 FIRST: Final = 400.0
 FARTHEST: Final = 4.0  # larger than any distance in the cube
+SPLINE: Final = 1e-5  # leaf units: farthest that quadratic curves lie off a spline
 Mask = npt.NDArray[np.bool_]
 _LUMA: Final = np.array([[0.25, 0.5, 0.25], [1.0, 0.0, -1.0], [-0.5, 1.0, -0.5]], np.float32)
 
@@ -173,8 +174,35 @@ def unpacked_colours(element: Element) -> Grid:
 
 
 def curves_of(element: Element) -> npt.NDArray[np.float64]:
-    """Curves (n, 3, 2) of an outline: start, control point and end, leaf units; any bytes give some."""
+    """Curves (n, 3, 2) of what is `curved`: start, control point and end, leaf units; any bytes of an outline
+    give some. Those of a spline lie within `SPLINE` of it.
+    """
+    if element.form == "polygon":
+        points = np.array(element.points)
+        ends = np.roll(points, -1, 0)
+        return np.stack([points, (points + ends) / 2, ends], 1)
+    if element.form == "spline":
+        return _quadratic(np.array(splined(element.points)))
     curves = np.frombuffer(element.data, "<i2").reshape(-1, 3, 2) / GRAIN
     straight = (curves[:, 1] == curves[:, 0]).all(1) | (curves[:, 1] == curves[:, 2]).all(1)
     curves[straight, 1] = curves[straight][:, ::2].mean(1)
     return curves
+
+
+def _quadratic(cubics: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+    """Quadratic curves (n, 3, 2) along cubic ones (m, 4, 2)."""
+    a, b, c, d = cubics.swapaxes(0, 1)
+    # |s (s - 1/2) (s - 1)|, by which the term of t^3 leaves the quadratic through three points, is below this
+    count = np.ceil(np.cbrt(np.hypot(*(d - 3 * c + 3 * b - a).T) * 3**0.5 / 36 / SPLINE)).astype(int).clip(1)
+    which = np.repeat(np.arange(len(cubics)), count)
+    step = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)
+    terms = np.stack([a, 3 * (b - a), 3 * (a - 2 * b + c), d - 3 * c + 3 * b - a])[:, which]
+
+    def at(t: npt.NDArray[np.float64]) -> npt.NDArray[np.float64]:
+        return np.asarray(terms[0] + t * (terms[1] + t * (terms[2] + t * terms[3])))
+
+    size = 1 / count[which, None]
+    begins = at(step[:, None] * size)
+    ends = np.roll(begins, -1, 0)  # so that curves meet to the last digit
+    middle = at((step[:, None] + 0.5) * size)
+    return np.stack([begins, 2 * middle - (begins + ends) / 2, ends], 1)

@@ -47,7 +47,7 @@ def emit(graph: Graph, manifest: Manifest, codes: Codes) -> Program:
         stage=graph.stage,
         model=manifest.name,
         weights=codes.digest,
-        objects=tuple([leaf.geometry for leaf in leaves]),
+        objects=tuple([leaf.called for leaf in leaves]),
         places=places_of([leaf.span for leaf in leaves]),
         numbers=tuple([leaf.number or at for at, leaf in enumerate(leaves, 1)]),
         elements=(*[graph.elements[name] for name in listed], *materials),

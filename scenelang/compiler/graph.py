@@ -198,6 +198,11 @@ class Leaf(Record):
         return cast("T", self.notes[key])
 
     @property
+    def called(self) -> str:
+        """The word of its geometry: of what is drawn by points without the digest of these."""
+        return self.geometry if "." in self.geometry else self.geometry.partition("_")[0]
+
+    @property
     def steps(self) -> tuple[Step, ...]:
         return tuple([move.step for move in self.moves])
 

@@ -4,17 +4,17 @@ from __future__ import annotations
 
 import re
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import field
+from dataclasses import field, replace
 from typing import Any, Final
 
-from scenelang.assets.element import Element, Gradient
+from scenelang.assets.element import Element, Gradient, drawn_element
 from scenelang.assets.element_file import load_textures
 from scenelang.assets.records import Record
 from scenelang.compiler import graph, steps
 from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, decoded, stage_of
-from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, compose
+from scenelang.compiler.steps import IDENTITY, Affine, Own, Rows, Shell, Step, compose, inverted, scaling
 from scenelang.language import nodes as schema
 from scenelang.language import words
 from scenelang.language.diagnostics import Diagnostics, Edit, Fix, Label, Span, listing
@@ -104,7 +104,8 @@ def lower(
         memory.leaves, memory.model = lowering.created, manifest.name
     stage = stage_of(scene) if space.dimension == 3 else None
     background = graph.WHITE if scene.background == "default" else scene.background
-    return Graph(root, scene.canvas, background, space, stage, brought.geometries, scene.samples)
+    elements = brought.geometries | lowering.drawn
+    return Graph(root, scene.canvas, background, space, stage, elements, scene.samples)
 
 
 def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnostics: Diagnostics) -> None:
@@ -124,6 +125,14 @@ def _check_canvas(scene: Scene, manifest: Manifest, place: Span | None, diagnost
     if scene.samples != 4 and not manifest.framed:
         help = "leave `samples` out, or draw with another model"
         diagnostics.add("E0381", f"{model} takes four samples of a pixel and no others", place, help=help)
+
+
+_BY_POINTS: Final = drawn_element("polygon", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)))[0]
+
+
+def _shrunk(step: Step, radius: float) -> Step:
+    """What changes a distance by lengths, for a leaf that was made so many times smaller."""
+    return steps.Shell(step.w / radius) if isinstance(step, Shell) else steps.Grow(step.r / radius)  # type: ignore[union-attr]
 
 
 Composite = Scene | schema.Group | schema.Boolean | schema.Chain
@@ -169,6 +178,7 @@ class _Lowering(Record, frozen=False):
     looks: dict[int, Look] = field(default_factory=dict)
     said: set[tuple[str, str]] = field(default_factory=set)
     steps: dict[int, Step | Refusal] = field(default_factory=dict)
+    drawn: dict[str, Element] = field(default_factory=dict)  # of polygons and splines
 
     def run(self, scene: Scene) -> Fold:
         stack = [_OpenComposite("union", 0.0, scene, None, _children(scene))]
@@ -210,9 +220,13 @@ class _Lowering(Record, frozen=False):
         number = self.objects + 1
         if seen and seen[0] is node and seen[1] is material and seen[2].number == number:
             leaf = seen[2]
+            if node.points and leaf.geometry != node.geometry:
+                self.drawn[leaf.geometry] = drawn_element(node.geometry, node.points)[0]
         else:
             if "." in node.geometry:
                 self.element(node.geometry, self.brought.geometries, node, "E0501")
+            elif node.geometry in words.OUTLINES and self.space.dimension == 2:
+                self.drawable(node.geometry, _BY_POINTS, node, "E0501")
             elif node.geometry not in self.manifest.geometries:
                 self.refuse("E0501", "geometry", node.geometry, self.manifest.geometries, node)
                 if words.dimension_of(node.geometry) not in (None, self.space.dimension):
@@ -220,26 +234,51 @@ class _Lowering(Record, frozen=False):
             look = Look(self.manifest.materials[0]) if material is None else self.look(material)
             notes: dict[Any, Any] | None = None if self.created is None else {}
             leaf = Leaf(node.geometry, look, self.moves(node), self.place(node), number, notes)
+            leaf = self.by_points(node, leaf) if node.points and self.space.dimension == 2 else leaf
         if self.created is not None:
             self.created[id(node)] = node, material, leaf
         return leaf
 
     def element(self, name: str, known: Mapping[str, Element], node: object, code: str) -> Element | None:
         """The element of a name in a file; reports one that the model does not draw, or that is not there."""
-        element, model = known.get(name), f"model `{self.manifest.name}`"
-        if element is not None and element.kind not in self.manifest.elements:
-            kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
-            help = "a scene is flat or solid; letters and drawings are of flat ones, meshes of solid ones"
-            if element.dimension == self.space.dimension:
-                help = "without a `model` line the usual model draws it"
-            self.say(code, f"{model} does not draw `{name}`, {kind}", node, help)
-        elif element is None and name.partition(".")[0] in self.brought.unread:
+        if (element := known.get(name)) is not None:
+            self.drawable(name, element, node, code)
+        elif name.partition(".")[0] in self.brought.unread:
             self.say("E0214", f"the file of `{name}` has not been read", node, "load the scene with a root")
-        elif element is None:
+        else:
             what = "material" if known is self.brought.materials else "geometry"
             fact = f"no file of elements has a {what} `{name}`"
             self.say(code, fact, node, "list its file in `elements`")
         return element
+
+    def drawable(self, name: str, element: Element, node: object, code: str) -> None:
+        """Report an element that the model does not draw."""
+        if element.kind not in self.manifest.elements:
+            kind = f"an {element.kind}" if element.kind.startswith("e") else f"a {element.kind}"
+            help = "a scene is flat or solid; letters and drawings are of flat ones, meshes of solid ones"
+            if element.dimension == self.space.dimension:
+                help = "without a `model` line the usual model draws it"
+            self.say(code, f"model `{self.manifest.name}` does not draw `{name}`, {kind}", node, help)
+
+    def by_points(self, node: schema.Object, leaf: Leaf) -> Leaf:
+        """The leaf of a polygon or a spline, an element in the unit disc that is moved to where it lies."""
+        element, (x, y), radius = drawn_element(node.geometry, node.points)
+        there = compose(steps.translation(x, y), scaling(radius, radius))
+        own = [move for move in leaf.moves if isinstance(move.step, Own)]
+        sized = [Move(_shrunk(move.step, radius), move.span) for move in own]
+        skin = steps.Skin.of([move.step for move in sized])
+        reach = abs(skin.grow) + skin.shell
+        if not self.space.usable(there) or not reach < REACH:
+            fact = f"`{node.geometry}` reaches {radius:.3g} around ({x:.3g}, {y:.3g})"
+            fact = f"{fact} and grows by {reach * radius:.3g}" if reach >= REACH else fact
+            self.say("E0312", f"{fact}, more than float32 holds", node, "give usual numbers, and scale it")
+            return leaf
+        self.drawn[element.name] = element
+        moves = (*sized, Move(Affine(there), leaf.span), *leaf.moves[len(own) :])
+        look = leaf.look
+        if look.element is not None:
+            look = replace(look, texture=(*look.texture, Affine(inverted(there))))
+        return Leaf(element.name, look, moves, leaf.span, leaf.number, leaf.notes)
 
     def moves(self, node: schema.SceneNode) -> tuple[Move, ...]:
         result, own, first = [], set[str](), isinstance(node, schema.Object)
@@ -380,6 +419,8 @@ class _Lowering(Record, frozen=False):
             help = f"a scene is flat or solid; model `{self.manifest.name}` has {listed}"
             if what == "material":
                 help = f"write material {' or '.join(self.manifest.shadings)} in its place"
+            if name in words.OUTLINES:
+                help = f"`{name}` is a leaf of the plane; {help}"
             place = self.place(self.origin)
             labels = () if place in (None, self.place(node)) else (Label(place, f"{SCENES[here]} by this"),)
             self.say(code, fact, node, help, labels)

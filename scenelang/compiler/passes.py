@@ -54,15 +54,16 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
         help = "leave `model` out, or draw with another one"
         context.diagnostics.add("E0506", fact, own.span or leaf.span, help=help)
     skin, row = Skin.of(leaf.steps), GEOMETRIES.get(leaf.geometry)
-    if own is not None and row is not None and _nothing(skin, row.inner or row.thickness / 2):
-        fact, help = f"nothing is left of this `{leaf.geometry}`", "shrink it less, or make its shell thicker"
+    deep = 1.0 if row is None else row.inner or row.thickness / 2  # no deeper than the disc or ball around it
+    if own is not None and _nothing(skin, deep):
+        fact, help = f"nothing is left of this `{leaf.called}`", "shrink it less, or make its shell thicker"
         context.diagnostics.add("W0404", fact, own.span or leaf.span, help=help)
     if manifest.lifting == "exact" and any(not isinstance(move.step, Affine) for move in leaf.moves):
         try:  # other liftings take any chain
             split_levels(leaf.steps, manifest.limits, space)
         except LevelsError as error:
             inner, outer = manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)
-            fact = f"the deformations of `{leaf.geometry}` do not fit model `{manifest.name}`: {error}"
+            fact = f"the deformations of `{leaf.called}` do not fit model `{manifest.name}`: {error}"
             help = (
                 f"the model holds up to {inner} deformations, an affine map, up to {outer} deformations "
                 "and an affine map; a `twirl` merges with the deformation after it, also across rotations "
@@ -76,10 +77,10 @@ def _check(leaf: Leaf, space: Space, context: Context) -> None:
     bad = next((rows for rows in maps if not space.usable(rows)), None)
     if bad is not None:
         smallest, largest = space.stretches(bad)
-        fact = f"the transforms of `{leaf.geometry}` compose to a singular one, which stretches by "
+        fact = f"the transforms of `{leaf.called}` compose to a singular one, which stretches by "
         fact, help = f"{fact}{smallest:.3g} to {largest:.3g}", "scale less along one direction, or less often"
     elif not all(_mild(move.step) for move in leaf.moves):
-        fact, help = f"the deformations of `{leaf.geometry}` compose to one beyond float32", "deform less"
+        fact, help = f"the deformations of `{leaf.called}` compose to one beyond float32", "deform less"
     else:
         return
     context.diagnostics.add("E0406", fact, leaf.span, labels=_places(leaf), help=help)
@@ -142,7 +143,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
     rows, trained = graph.rows(), context.manifest.trained
     measures = partial(_measures, space=graph.space)
     outside: dict[str, list[tuple[float, float, Leaf]]] = {}  # (by how much, value, object)
-    letters = {name for name, element in graph.elements.items() if element.form == "outline"}
+    letters = {name for name, element in graph.elements.items() if element.curved}
     for _, leaf, _, _, _, cuts in rows:
         exact = leaf.geometry in letters  # computed at any scale
         for quantity, value in (*leaf.noted("measures", measures), *_texels(leaf, graph)):
@@ -160,7 +161,7 @@ def check_trained(graph: Graph, context: Context) -> Graph:
         if result := outside.get(quantity):
             _, value, leaf = max(result, key=itemgetter(0))
             more = len({id(leaf) for *_, leaf in result}) - 1
-            said = subject.format(name=f"`{leaf.geometry}`", value=f"{value:.3g}")
+            said = subject.format(name=f"`{leaf.called}`", value=f"{value:.3g}")
             others = f", as {more:,} more {'are' if more > 1 else 'is'}" if more else ""
             _warn(context, code, quantity, f"{said} is", leaf, value, others)
     smooth = [row.leaf for row in rows if row.op == "smooth"]
@@ -319,7 +320,7 @@ def check_media(graph: Graph, context: Context) -> Graph:
             taken = f"is not seen, as the medium `{medium.geometry}` after it takes its place"
             lit = f"is lit as if it had the shape of the medium `{medium.geometry}` around it"
             more = f", as {plural(len(pairs) - 1, 'solid')} more" * (len(pairs) > 1)
-            fact = f"this `{leaf.geometry}` {taken if code == 'W0405' else lit}{more}"
+            fact = f"this `{leaf.called}` {taken if code == 'W0405' else lit}{more}"
             labels = [Label(medium.span, "the medium")] if medium.span is not None else []
             help = f"carve it out: subtract {{ {medium.geometry} {{ … }} {leaf.geometry} {{ … }} }} beside it"
             context.diagnostics.add(code, fact, leaf.span, labels=labels, help=help)
@@ -434,7 +435,7 @@ def check_seen(graph: Graph, context: Context) -> Graph:
     elif graph.stage is None and graph.root.links[-1] == Link("union", last) and last.look.plain:
         cover = cover_of(last, graph.space)
         if cover is not None and covered(graph.window(), [cover]):
-            fact = f"this `{last.geometry}` covers the whole canvas: the picture has one colour"
+            fact = f"this `{last.called}` covers the whole canvas: the picture has one colour"
             _say(context, fact, last.span, _units(graph, cover[0] > _FAR))
     return graph
 

@@ -9,7 +9,8 @@ their bytes. Where some are materials it is format 3, with a table of paints (`P
 the index of each row's paint or -1. With groups, or cuts that have a width, it is format 4, and has these
 where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
 places `OTHERS` of vectors, ``samples`` other than 4, which the header then has, or a stage that has a sky or
-another count of lights than one, or one of a radius, it is format 5.
+another count of lights than one, or one of a radius, it is format 5. With polygons or splines it is format 6:
+``outlines`` I32 (K, 3), place among the elements, kind and number of points, and ``points`` F64 (M, 2).
 """
 
 from __future__ import annotations
@@ -25,7 +26,15 @@ import numpy as np
 import numpy.typing as npt
 
 from scenelang.assets import notebook
-from scenelang.assets.element import Element, Gradient, stops_fault
+from scenelang.assets.element import (
+    BY_POINTS,
+    POINTS,
+    Element,
+    Gradient,
+    element_of,
+    points_fault,
+    stops_fault,
+)
 from scenelang.assets.element_file import MOST_ELEMENT_BYTES, entry_of, read_elements
 from scenelang.assets.files import read_regular, write_output
 from scenelang.assets.tensors import FORMAT, MOST_HEADER, TensorError, TensorFile, check_fields, read_tensors
@@ -38,7 +47,7 @@ from scenelang.language.diagnostics import plural
 from scenelang.language.nodes import DENSEST, MOST, SAMPLES
 from scenelang.language.words import TOKENS
 
-GROUPED, NEWEST = 4, 5  # formats of files with groups, and with what is newer
+GROUPED, NEWER, NEWEST = 4, 5, 6  # formats of files with groups, with what is newer, with outlines by points
 STEPS: Final = {"color": 3, "grayscale": 1, "hue": 1}
 """Operations on a colour and how many numbers each has; files have their index here."""
 _GRADED: Final = {-1: "linear", -2: "radial"}
@@ -250,13 +259,16 @@ class Program:
         return bool((self.vectors[self.tokens >= TOKENS["subtract"], layout.places.width] > 0.0).any())
 
     @property
-    def newest(self) -> bool:
-        """True where it has what files of format 5 alone have: gradients, other samples, `OTHERS`."""
+    def newer(self) -> bool:
+        """True where it has what files have from format 5 on: gradients, other samples, `OTHERS`."""
         layout = self._layout()
         if self.samples != 4 or (layout is not None and self.vectors[:, layout.others].any()):
             return True
-        outlines = any(element.form == "outline" for element in self.elements)
-        return outlines or self.lit or any(isinstance(paint.element, Gradient) for paint in self.palette)
+        return (
+            any(element.curved for element in self.elements)
+            or self.lit
+            or any(isinstance(paint.element, Gradient) for paint in self.palette)
+        )
 
     @property
     def lit(self) -> bool:
@@ -295,8 +307,10 @@ def program_bytes(program: Program) -> bytes:
     header |= {"files": files, "format": FORMAT, "geometries": geometries}
     if program.stage is not None:
         header["stage"] = stage_data(program.stage)
+    outlines = [(at, e) for at, e in enumerate(program.elements) if e.form in BY_POINTS]
+    listed = [(at, e) for at, e in enumerate(program.elements) if e.form not in BY_POINTS]
     if program.elements:
-        header |= {"format": 2, "elements": [[e.name, entry_of(e)] for e in program.elements]}
+        header |= {"format": 2, "elements": [[e.name, entry_of(e)] for _, e in listed]}
     tensors = {name: getattr(program, name) for name in ("vectors", "tokens", "bounds")}
     tensors["objects"] = np.array([of_geometry[name] for name in program.objects], dtype=np.int32)
     tensors["places"] = np.array(places, dtype=np.int32).reshape(len(program), 5)
@@ -304,12 +318,18 @@ def program_bytes(program: Program) -> bytes:
         tensors["numbers"] = np.array(program.numbers, dtype=np.int32)
     if program.elements and program.forms is not None:
         tensors["forms"] = program.forms
-        tensors |= {f"element.{at}": np.frombuffer(e.data, np.uint8) for at, e in enumerate(program.elements)}
+        held = ((at, e) for at, (_, e) in enumerate(listed))
+        tensors |= {f"element.{at}": np.frombuffer(e.data, np.uint8) for at, e in held}
     if program.palette and program.worn is not None:
         header["format"] = 3
         tensors |= {"worn": program.worn, **paint_tensors(program.palette, program.elements)}
-    if program.newest:
+    if outlines:
         header["format"] = NEWEST
+        table = [(at, BY_POINTS.index(e.form), *e.sizes) for at, e in outlines]
+        tensors["outlines"] = np.array(table, np.int32)
+        tensors["points"] = np.frombuffer(b"".join(e.data for _, e in outlines), "<f8").reshape(-1, 2)
+    elif program.newer:
+        header["format"] = NEWER
     elif program.extended:
         header["format"] = GROUPED
     if program.samples != 4:
@@ -395,7 +415,7 @@ def _light_fault(program: Program) -> str | None:
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
 MOST_PROGRAM_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
-MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8)
+MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8 + 12) + 16 * _MOST_STEPS
 
 _Columns = dict[str, tuple[str, tuple[int, ...]]]  # kinds of numbers, and the sides of each row
 _LAYOUT: _Columns = {"vectors": ("F32", (WIDTH,)), "tokens": ("I8", ()), "bounds": ("F32", (4,))}
@@ -403,6 +423,7 @@ _LAYOUT |= {"objects": ("I32", ()), "places": ("I32", (5,))}
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
 _TABLES: _Columns = {"paints": ("I32", (2,)), "steps": ("F32", (4,)), "stops": ("F32", (5,))}
 _PAINTS = {"paints", "steps"}
+_OUTLINES: _Columns = {"outlines": ("I32", (3,)), "points": ("F64", (2,))}
 _HEADER: dict[Any, Any] = dict.fromkeys(("format", "samples?"), int) | dict.fromkeys(
     ("model", "weights"), str
 )
@@ -432,12 +453,13 @@ def parse_program(data: bytes) -> Program:
     try:
         file = read_tensors(data, MOST_PROGRAM_BYTES, range(FORMAT, NEWEST + 1))
         clear = {"background": type(None)} if file.header.get("background", 0) is None else {}
-        newer = {"samples?"} if file.header["format"] < NEWEST else set()
+        newer = {"samples?"} if file.header["format"] < NEWER else set()
         schema = {name: each for name, each in (_HEADER | clear).items() if name not in newer}
         check_fields(file.header, schema, "the header")
         elements = _read_elements(file)
         count = _count(file)
         tensors = file.arrays()
+        elements = _with_outlines(elements, tensors)
         palette = read_paints(tensors, elements) if "worn" in tensors else ()
     except TensorError as error:
         raise ProgramError(f"not a program: {error}") from None
@@ -454,7 +476,7 @@ def parse_program(data: bytes) -> Program:
         staged = None if stage is None else read_stage(stage)
     except ValueError as error:
         raise ProgramError(f"a damaged stage: {error}") from None
-    if staged is not None and not staged.plain and header["format"] < NEWEST:
+    if staged is not None and not staged.plain and header["format"] < NEWER:
         raise ProgramError(f"a damaged stage: lights that format {header['format']} does not have")
     return Program(
         vectors=tensors["vectors"],
@@ -493,26 +515,50 @@ def _read_elements(file: TensorFile) -> tuple[Element, ...]:
     return read_elements(result, file.body)
 
 
+def _with_outlines(
+    elements: tuple[Element, ...], tensors: dict[str, npt.NDArray[Any]]
+) -> tuple[Element, ...]:
+    """The elements of a file with those that it has as points, at their places; raises `TensorError`."""
+    result, first = [*elements], 0
+    table, points = (tensors.pop(name, np.zeros((0, 3))) for name in _OUTLINES)
+    for at, kind, count in table.tolist():
+        own = points[first : first + count]
+        if not 0 <= at <= len(result) or kind not in range(len(BY_POINTS)) or len(own) not in POINTS:
+            raise TensorError("an outline by points that is not one")
+        if (
+            count != len(own)
+            or np.hypot(*own.T).max() > 1.0 + 1e-9
+            or points_fault(tuple(map(tuple, own.tolist())))
+        ):
+            raise TensorError("an outline whose points are none")
+        result.insert(at, element_of(BY_POINTS[kind], own.tolist()))
+        first += count
+    if first != len(points):
+        raise TensorError("points that no outline has")
+    return tuple(result)
+
+
 def _count(file: TensorFile) -> int:
     """Objects of a file whose tensors are those of a Program."""
     format = file.header["format"]
     newer = ({"forms"} if format > 1 else set()) | ({"worn", *_PAINTS} if format > 2 else set())
     if format >= GROUPED:  # these are there where scenes have elements, and where materials are among them
-        newer &= file.tensors.keys() if "elements" in file.header or format == NEWEST else set()
+        newer &= file.tensors.keys() if "elements" in file.header or format >= NEWER else set()
         if "worn" in newer:
             newer |= _PAINTS
         if format > 4 and "worn" in newer:
             newer |= {"stops"} & file.tensors.keys()
+    newer |= set(_OUTLINES) if format == NEWEST else set()
     if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
         raise TensorError(f"it holds other tensors than a program of format {format}")
     count = (*file.tensors["vectors"].shape, 0)[0]
     if count > MOST_OBJECTS:
         raise TensorError(f"{count:,} objects, at most {MOST_OBJECTS:,}")
     for name, tensor in file.tensors.items():
-        kind, rest = (_LAYOUT | _OPTIONAL | _TABLES)[name]
+        kind, rest = (_LAYOUT | _OPTIONAL | _TABLES | _OUTLINES)[name]
         rows = count
-        if name in _TABLES:
-            most = MOST_OBJECTS if name == "paints" else _MOST_STEPS
+        if name in _TABLES | _OUTLINES:
+            most = MOST_OBJECTS if name in ("paints", "outlines") else _MOST_STEPS
             rows = min((*tensor.shape, 0)[0], most)
         if tensor.type != kind or tensor.shape != (rows, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")

@@ -292,7 +292,8 @@ class Stream:
         # what follows a group follows its first row, and the group's own blend does
         self.group_joins = Joins(groups.joins, widths[first], free[first])
         names = [leaf.geometry for leaf in self._leaves]
-        self.unknown = tuple(sorted(set(names) & graph.elements.keys()))
+        self.unknown = set(names) & graph.elements.keys()
+        self.unproved = tuple(sorted({leaf.called for leaf in self._leaves if leaf.geometry in self.unknown}))
         self._shapes = {name: np.array([own == name for own in names]) for name in dict.fromkeys(names)}
         self._plain = np.array([leaf.look.colour() for leaf in self._leaves]).reshape(-1, 3).T
         opacity = np.array([leaf.look.opacity for leaf in self._leaves])
@@ -476,7 +477,7 @@ def prove_image(
         credit = image.credit
         image = from_samples(picture[..., :3], picture[..., 3] if clear else None)
         image.credit = credit
-    return image, Proof(bound, redrawn, stream.unknown)
+    return image, Proof(bound, redrawn, stream.unproved)
 
 
 def _off(drawn: Floats, shown: Interval) -> Floats:

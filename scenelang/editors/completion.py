@@ -424,6 +424,7 @@ class _Maker:
         for name in sorted(self.geometries):
             text = f"{name} {{ ${{1:scale(0.5);}} }}"
             yield Proposal(name, Kind.Class, text, rank, "geometry", words.GEOMETRIES[name], True)
+        yield from _calls(words.OUTLINES if "square" in self.geometries else {}, rank, Kind.Class)
         for symbol in self.names.visible(self.cursor.offset):
             if symbol.kind == "module":
                 yield self._symbol(symbol, statement=True)

@@ -92,7 +92,7 @@ def dump(graph: Graph) -> str:
         word = "" if first or link.op == "union" else f"{op_text(link)} "
         node = link.node
         if isinstance(node, Leaf):
-            name = f"{node.geometry} {look_text(node.look, graph.space)}"
+            name = f"{node.called} {look_text(node.look, graph.space)}"
             name += "" if node.look.material == "flat" else f" {node.look.shading}"
         else:
             name = f"({node.kind})"
@@ -338,7 +338,8 @@ def draw_scene(scene: schema.Scene, most: int = MOST_BOXES) -> list[Box]:
             case schema.Object():
                 ops = () if inner is None else map(space.inked, inner.ops)
                 fill = None if inner is None else hex_text(space.written(coloured(colour_steps(ops))))
-                return Box((node.geometry, *lines), fill, leaf=True), []
+                said = f" of {len(node.points):,} points" if node.points else ""
+                return Box((node.geometry + said, *lines), fill, leaf=True), []
             case schema.Chain():
                 links = enumerate(node.children)
                 below = [(str(link.op) if at else "", (link.node, inner)) for at, link in links]

@@ -337,6 +337,7 @@ def _use(docs: Workspace, document: Document, use: Use) -> str | None:
             return (_word(table[text]) + _transform_facts(document, use)) if text in table else None
         case "geometry":
             about = _offered(text, text, words.GEOMETRIES)
+            about = f"{_word(words.OUTLINES[text])}\n\nof flat scenes" if text in words.OUTLINES else about
             node = next((n for n in _calls(document, use) if n.name.text == text), None)
             return about and about + _node_facts(document, node)
         case "material":

@@ -73,6 +73,7 @@ def likely_dimensions(session: Session, source: SourceFile) -> tuple[int, ...]:
     """Dimension of what a text draws; both where nobody can tell."""
     known = session.report.words(source)
     likely = {d for d, leaves in words.LEAVES.items() if not known.isdisjoint(leaves)}
+    likely |= set() if known.isdisjoint(words.OUTLINES) else {2}
     likely |= {3} if not known.isdisjoint(words.STAGE) else set()
     likely |= ({2} if "shapes" in known else set()) | ({3} if "meshes" in known else set())
     return (*likely,) if len(likely) == 1 else (*words.LEAVES,)
@@ -103,7 +104,7 @@ def unknown_material(name: tree.Name, place: Site, known: set[str]) -> Advice:
 def drawn(place: Site) -> str:
     """Shapes that can be drawn, in the plane or in space."""
     dimensions = likely_dimensions(place.session, place.file.source)
-    said = {n: listing(words.LEAVES[n]) for n in dimensions}
+    said = {n: listing([*words.LEAVES[n], *(words.OUTLINES if n == 2 else ())]) for n in dimensions}
     if len(said) == 1:
         return f"there is {said[dimensions[0]]}" + (f", and what is {_MESHES}" if dimensions == (3,) else "")
     return f"flat scenes draw {said[2]}, solid ones {said[3]}, and what is {_MESHES}"

@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterable, Sequence
 from typing import Any, Final, NamedTuple
 
+from scenelang.assets.element import POINTS, Points, points_fault
 from scenelang.assets.records import Record
 from scenelang.language import expressions, library, tree
 from scenelang.language.builder import Action, Builder, ChainBuilder, Site, make
@@ -17,7 +18,7 @@ from scenelang.language.scene import MAX_NODE_DEPTH, Boolean, Chain, Group, Mate
 from scenelang.language.scopes import VALUES, head_of
 from scenelang.language.session import UNBOUND, Binding, Definition, Env, Needs, Scope, Session, Slots
 from scenelang.language.values import MAX_VECTOR, POISON, Problem, RangeValue, Vec, number, show, unexpected
-from scenelang.language.words import KEYWORDS, LANGUAGE, SETTINGS
+from scenelang.language.words import KEYWORDS, LANGUAGE, OUTLINES, SETTINGS
 
 
 class PreparedBlock(NamedTuple):
@@ -399,12 +400,41 @@ _SIDES: Final = {
 """Leaves, how long their sides are, and what of the library takes sides."""
 
 
+def _points(value: Any) -> Points:
+    """The points of a polygon or a spline; raises Problem, whose operand is 0, or 1 on for a point."""
+    if value.__class__ is not Vec:
+        help = 'a regular one is polygon(n, r) of "std/shapes"' if value.__class__ is float else None
+        raise unexpected("a vector of points [x, y]", value, help, 0)
+    for at, item in enumerate(value.items[: POINTS[-1] + 1], 1):  # of more their number is reported
+        if item.__class__ is not Vec or [part.__class__ for part in item.items] != [float, float]:
+            raise unexpected("a point [x, y]", item, "points are vectors of two numbers", at)
+    points = tuple([item.items for item in value.items[: POINTS[-1] + 1]])
+    if (fault := points_fault(points, len(value.items))) is not None:
+        raise Problem("E0311", fault, "it takes 3 to 1,000 points that span an area", 0)
+    return points
+
+
+def _prepare_points(stmt: tree.Call, place: Site) -> Callable[[Env], Any] | None:
+    """The points that a polygon or a spline is called with; None after a report."""
+    word, given = OUTLINES[stmt.name.text], expressions.prepare_arguments(stmt.args, place)
+    bound = bind(place.report, stmt.name, word.params, word.required, given)
+    if not bound or bound[0] is None:
+        return None
+    get, written = bound[0].code.run, bound[0].arg.value
+    items = written.items if isinstance(written, tree.Vector) else ()
+    if any(isinstance(item, tree.ForItem | tree.IfItem) for item in items):
+        items = ()
+    check = guarded(place, _points, written.span, (written, *items), item_steps=1)
+    return lambda env: check(get(env))
+
+
 def prepare_object(stmt: tree.Call, place: Site, geometry: str | None = None) -> Action | None:
-    """``GEOMETRY { … }`` with a geometry that the model has, or one of its own."""
+    """``GEOMETRY { … }`` with a geometry that the model has, or one of its own; or one by its points."""
     name, session, where = stmt.name.text, place.session, Written(stmt.name.span, stmt.span)
-    fits = holds_children(place, where.name, "object `{}`", name)
-    body = prepare_inner(stmt.body, place.inner("object"))
-    if stmt.args:
+    fits, by_points = holds_children(place, where.name, "object `{}`", name), name in OUTLINES
+    body = prepare_inner(stmt.body, place.inner("object")._replace(by_points=by_points))
+    points_of = _prepare_points(stmt, place) if by_points else lambda env: ()
+    if stmt.args and not by_points:
         expressions.prepare_arguments(stmt.args, place)
         if fits:
             help = f"size it in its block: {name} {{ scale(0.5); }}"
@@ -419,16 +449,18 @@ def prepare_object(stmt: tree.Call, place: Site, geometry: str | None = None) ->
             message = f"`{name}` takes no arguments"
             session.report.error("E0308", message, stmt.args[0].span, help=help, fix=fix)
         return None
-    if not fits:
+    if not fits or points_of is None:
         return None
     place.file.weight += OBJECT
 
     def action(env: Env, out: Builder) -> None:
         inside = Builder()
         body.run(env, inside, session, where.name)
+        if (points := points_of(env)) is POISON:
+            return
         session.count_objects(1, where.name)
         fields: dict[str, Any] = {"kind": "object", "geometry": geometry or name}
-        fields |= {"transforms": tuple(inside.transforms), "material": inside.material}
+        fields |= {"transforms": tuple(inside.transforms), "material": inside.material, "points": points}
         place_child(make(Object, fields), where, out, session)
 
     return action

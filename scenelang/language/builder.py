@@ -115,6 +115,7 @@ class Site(NamedTuple):
     nested: bool = False  # a ``for`` or ``if`` stands between it and that block's braces
     repeated: bool = False  # a ``for`` stands around it, however far out
     block: Scope | None = None  # the names of that block, which tell it from others
+    by_points: bool = False  # in the block of a polygon or a spline
 
     @property
     def session(self) -> Session:

@@ -229,6 +229,12 @@ def _shear(spec: Spec, terms: Sequence[Any]) -> nodes.Shear:
 
 GEOMETRY: Final = {name: Spec.of(word) for name, word in words.TRANSFORMS.items()}
 TEXTURE: Final = {name: Spec.of(word) for name, word in words.OPERATIONS.items()}
+_ANY_WALL: Final = _within(lambda w: w > 0.0, "a wall of {} is not above 0")
+BY_POINTS: Final = {
+    name: replace(GEOMETRY[name], rows=((field, read, 1.0, 0),))
+    for name, field, read in (("grow", "r", number), ("shell", "w", _ANY_WALL))
+}
+"""In the blocks of polygons and splines, in whose own units the numbers are."""
 EVEN_SCALE: Final = replace(GEOMETRY["scale"], word=words.Word("scale", "scale(s)", "", ("s",), 1))
 
 
@@ -264,6 +270,7 @@ def prepare_move(stmt: tree.Call, place: Site) -> Action | None:
         return None
     if name == "scale" and len(given) == 1 and (given[0].arg.name is None or given[0].arg.name.text == "s"):
         spec = EVEN_SCALE
+    spec = BY_POINTS.get(name, spec) if place.by_points and place.kind == "object" else spec
     word = spec.word
     bound = bind(report, stmt.name, word.params, word.required, given, spread=spec.spread, help=spec.help)
     if bound is None:

@@ -29,10 +29,10 @@ from pydantic import (
     model_validator,
 )
 
-from scenelang.assets.element import material_fault
+from scenelang.assets.element import POINTS, material_fault, points_fault
 from scenelang.language.diagnostics import plural
 from scenelang.language.refusals import refusal
-from scenelang.language.words import BLEND, RESERVED, Combine
+from scenelang.language.words import BLEND, OUTLINES, RESERVED, Combine
 
 Triple = tuple[float, float, float]
 MOST: Final = 1e12
@@ -56,6 +56,15 @@ def camera_fault(eye: Triple, target: Triple, fov_rad: float) -> tuple[str, str]
 
 def light_fault(power: float) -> str | None:
     return f"a power of {power:g} is negative" if power < 0.0 else None
+
+
+OWN_RANGES: Final = {"grow": (-0.5, 1.0), "shell": (0.0, 1.0)}
+"""Ranges of what changes a leaf's own distance; of polygons and splines it may be any number."""
+
+
+def own_range(kind: str) -> str:
+    low, high = OWN_RANGES[kind]
+    return f"{low:g} to {high:g} but of a polygon or spline"
 
 
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
@@ -234,7 +243,7 @@ class Frozen(BaseModel):
 
 LATER: Final = {
     **{"opacity": 1.0, "glow": None, "density": None, "roughness": None},
-    **{"radius": 0.0, "sky": "default", "samples": 4},
+    **{"radius": 0.0, "sky": "default", "samples": 4, "points": ()},
 }
 """Fields that came later, and their usual values."""
 
@@ -244,7 +253,11 @@ class Brief(Frozen):
 
     @model_serializer(mode="wrap")
     def _in_short(self, plain: SerializerFunctionWrapHandler) -> dict[str, Any]:
-        return {name: v for name, v in plain(self).items() if name not in LATER or LATER[name] != v}
+        return {
+            name: v
+            for name, v in plain(self).items()
+            if name not in LATER or LATER[name] != getattr(self, name)
+        }
 
 
 class _Turn(Frozen):
@@ -365,14 +378,14 @@ class Grow(Frozen):
     """Takes ``r`` off the leaf's own distance, so that its edge moves out by it; first, before any move."""
 
     kind: Literal["grow"] = _kind("grow")
-    r: Annotated[Finite, Field(ge=-0.5, le=1, description="leaf units; below 0 the leaf shrinks")]
+    r: Annotated[Finite, Field(description=f"leaf units, {own_range('grow')}; below 0 the leaf shrinks")]
 
 
 class Shell(Frozen):
     """Keeps what is within ``w`` / 2 of the leaf's edge; first, before any move."""
 
     kind: Literal["shell"] = _kind("shell")
-    w: Annotated[Finite, Field(gt=0, le=1, description="leaf units; half on either side of the edge")]
+    w: Annotated[Finite, Field(gt=0, description=f"leaf units, {own_range('shell')}; half on either side")]
 
 
 Transform = Annotated[
@@ -600,19 +613,52 @@ class Material(Brief):
         return _checked(self, fault is not None, fault[1] if fault else "")  # type: ignore[no-any-return]
 
 
-class Object(Frozen):
-    """A leaf geometry, its transforms nearest the leaf first, and its material."""
+class Object(Brief):
+    """A leaf geometry, its transforms nearest the leaf first, and its material; a polygon's ``points``."""
 
     kind: Literal["object"] = _kind("object")
     geometry: Annotated[Dotted, Field(description="a leaf geometry of the model, or an element's")]
     transforms: Transforms = ()
     material: Material | None = None
+    points: Annotated[
+        tuple[tuple[Length, Length], ...],
+        Field(max_length=POINTS[-1], description=f"of a polygon or a spline, at least {POINTS[0]}"),
+    ] = ()
 
     if TYPE_CHECKING:
 
         def __init__(
-            self, geometry: str, transforms: Moves = (), material: Material | None = None
+            self,
+            geometry: str,
+            transforms: Moves = (),
+            material: Material | None = None,
+            points: Iterable[Sequence[float]] = (),
         ) -> None: ...
+
+    @model_validator(mode="after")
+    def _fits(self) -> Self:
+        by_points = self.geometry in OUTLINES
+        fault = points_fault(self.points) if by_points else "it has no points" if self.points else None
+        for own in () if by_points else self.transforms:
+            value = own.r if isinstance(own, Grow) else own.w if isinstance(own, Shell) else 0.0
+            low, high = OWN_RANGES.get(own.kind, (0.0, 0.0))
+            if not low <= value <= high:
+                fault = f"`{own.kind}` by {value:g} is outside {low:g}..{high:g}"
+        return _checked(self, fault is not None, f"`{self.geometry}`: {fault}")  # type: ignore[no-any-return]
+
+
+def polygon(
+    points: Iterable[Sequence[float]], transforms: Moves = (), material: Material | None = None
+) -> Object:
+    """A polygon by its points, closed; what its edges go around, by the winding number, is inside."""
+    return Object("polygon", transforms, material, points)
+
+
+def spline(
+    points: Iterable[Sequence[float]], transforms: Moves = (), material: Material | None = None
+) -> Object:
+    """A smooth closed curve through points, a uniform Catmull-Rom spline."""
+    return Object("spline", transforms, material, points)
 
 
 class Group(Frozen):

@@ -48,6 +48,8 @@ def _node(word: str, node: SceneNode, depth: int) -> list[_Line]:
     margin = _INDENT * depth
     inside = margin + _INDENT
     head = node.geometry if isinstance(node, Object) else node.kind
+    if isinstance(node, Object) and node.points:
+        head += f"([{', '.join(map(vector, node.points))}])"
     if isinstance(node, Boolean):
         head = blend(node.op, node.k)
     statements = [material(node.material)] if node.material is not None else []

@@ -525,7 +525,8 @@ def prepare_text(stmt: tree.Call, place: Site, letters: Letters) -> Action | Non
         for name, x, y, radius in line:
             scale = make(Scale, {"kind": "scale", "x": radius, "y": radius, "z": radius})
             moves = scale, make(Translate, {"kind": "translate", "x": x, "y": y, "z": 0.0})
-            fields = {"kind": "object", "geometry": f"{file}.{name}", "transforms": moves, "material": None}
+            fields: dict[str, Any] = {"kind": "object", "geometry": f"{file}.{name}"}
+            fields |= {"transforms": moves, "material": None, "points": ()}
             blocks.place_child(make(Object, fields), where, inside, session)
         blocks.place_called(inside, block, env, where, out, session)
 
@@ -553,7 +554,7 @@ def prepare_headed(stmt: tree.Call, place: Site) -> Action | None:
     if head == "move":
         return prepare_move(stmt, place)
     if binding is None or head == "leaf":
-        if name in words.GEOMETRIES:
+        if name in words.GEOMETRIES or name in words.OUTLINES:
             return blocks.prepare_object(stmt, place)
         if not _lacks_module(stmt, place):
             if _boolean(stmt) is None:
@@ -683,7 +684,7 @@ def _candidates(stmt: tree.Call, place: Site) -> set[str]:
     names = advice.visible(place, scopes.VALUES if kind == "object" else ("module",))
     if kind == "object":
         return {*names, "material"}
-    known = {*words.GEOMETRIES, *names}
+    known = {*words.GEOMETRIES, *words.OUTLINES, *names}
     if stmt.body is None:
         calls = words.TRANSFORMS if kind != "file" else words.SETTINGS
         return known if stmt.args is None else known | {*calls}

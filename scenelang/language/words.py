@@ -97,6 +97,8 @@ REFLECTING: Final = ("glossy", "metal")
 KINDS_WITH: Final = {"density": ("volumetric",), "roughness": REFLECTING}
 """Shadings that have a property, where not all have it."""
 
+OUTLINES: Final = _TABLES["leaves by points"]
+"""Leaves of the plane that are called with their points; a definition of such a name hides them."""
 FUNCTIONS: Final = _TABLES["functions"]
 LETTERS: Final = _TABLES["letters"]
 """What a font brings, behind the name of its import."""
@@ -134,6 +136,8 @@ SCENES: Final = {2: "flat", 3: "solid"}
 
 def dimension_of(name: str) -> int | None:
     """The dimension of scenes that have a geometry or a shading; None for a name that either may have."""
+    if name in OUTLINES:
+        return 2
     return next((d for d in LEAVES if name in LEAVES[d] or name in SHADINGS[d]), None)
 
 
@@ -144,4 +148,6 @@ LANGUAGE: Final = frozenset((*TRANSFORMS, *OPERATIONS, *PLAIN_SETTINGS)) - NEWER
 def word_for_call(name: str, in_material: bool) -> Word | None:
     """The word of the language that is called by a name."""
     tables = (OPERATIONS, TRANSFORMS) if in_material else (TRANSFORMS, OPERATIONS)
-    return next((table[name] for table in (*tables, SETTINGS, FUNCTIONS, NODES) if name in table), None)
+    return next(
+        (table[name] for table in (*tables, SETTINGS, FUNCTIONS, NODES, OUTLINES) if name in table), None
+    )

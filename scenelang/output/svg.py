@@ -17,7 +17,7 @@ from typing import Any, Final, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
-from scenelang.assets.element import Gradient
+from scenelang.assets.element import BY_POINTS, Gradient, splined
 from scenelang.compiler.groups import BEGINS, ENDS, OPERATOR, SMOOTH, SUBTRACT, UNION
 from scenelang.compiler.program import Program
 from scenelang.drawing.how import RenderError
@@ -379,16 +379,39 @@ class Inks:
         q = field.frames.local(field.xp, np.full(p.shape[1], row), world.astype(np.float32))
         return np.asarray(q, np.float64)[:, 0]
 
-    def _gradient(self, row: int, gradient: Gradient) -> str | None:
-        """A gradient; None where its lines are bent."""
-        whole = self.shapes.whole
+    def _back(self, row: int, matrix: Floats) -> Floats | None:
+        """The map (3, 2) to points from what a map (2, 3) makes of a leaf's own; None where that is bent."""
         p = np.array([[0, 0, 1], [1, 0, 1], [0, 1, 1], [1, 1, 1], [0.5, 0.5, 1]]) * [*self.shapes.size, 1]
-        matrix = whole.parts.texture[row].astype(np.float64).reshape(2, 3)
         there = self._local(row, p[:, :2].T).T @ matrix[:, :2].T + matrix[:, 2]
         way = np.linalg.lstsq(p, there, rcond=None)[0]
         if abs(p @ way - there).max() > 1e-4 or not abs(np.linalg.det(way[:2])) > 1e-12:
             return None
-        back = np.linalg.inv(np.concatenate([way, [[0], [0], [1]]], 1))[:, :2]
+        return np.asarray(np.linalg.inv(np.concatenate([way, [[0], [0], [1]]], 1))[:, :2])
+
+    def path(self, layer: SvgLayer) -> str | None:
+        """The path of a whole polygon or spline as it is written; None of all else."""
+        element = self.shapes.brought[layer.row]
+        alone = len(layer.shape) == 1 and not layer.wins and not layer.shape[0].inner
+        if (
+            element is None
+            or element.form not in BY_POINTS
+            or not alone
+            or self.shapes.whole.skinned[layer.row]
+        ):
+            return None
+        if (back := self._back(layer.row, np.eye(3)[:2])) is None:
+            return None
+        spline = element.form == "spline"
+        ends = [curve[1:] for curve in splined(element.points)] if spline else element.points[1:]
+        first, *rest = (np.reshape(p, (-1, 2)) @ back[:2] + back[2] for p in (element.points[0], *ends))
+        return f"M{_said(*first[0])}" + "".join("LC"[spline] + _said(*p.ravel()) for p in rest) + "z"
+
+    def _gradient(self, row: int, gradient: Gradient) -> str | None:
+        """A gradient; None where its lines are bent."""
+        whole = self.shapes.whole
+        back = self._back(row, whole.parts.texture[row].astype(np.float64).reshape(2, 3))
+        if back is None:
+            return None
         moved = " ".join(f"{round(value, 6) + 0.0:.6g}" for value in back.ravel())
         texture, stops = whole.textures[self.looks[row][2]], np.array(gradient.stops)
         if any(step[0] == "hue" for step in texture.steps):  # which bends the way from colour to colour
@@ -440,8 +463,8 @@ def svg_of(program: Program, exact: bool) -> tuple[str, bool]:
         raise RenderError(f"{blended:,} objects of other colours in a blend; an SVG has {MOST_BLENDED}")
     for layer in layers:
         region = Region(shapes, layer)
-        data = ""
-        for points, normals in region.outlines():
+        data = inks.path(layer) or ""
+        for points, normals in () if data else region.outlines():
             x, y = points
             if abs((x * np.roll(y, 1) - y * np.roll(x, 1)).sum()) / 2 > SMALL:
                 data += path_of(points, normals)

@@ -33,7 +33,7 @@ from scenelang.drawing.tables import read_ways
 MODULES: Final = (
     *("store", "gl", "grids", "groups", "ways", "plane"),
     *("values", "functions", "maps", "looks", "chain", "graph", "stage"),
-    *("eye", "letters", "expressions", "evaluate"),
+    *("eye", "letters", "outlines", "expressions", "evaluate"),
     *("elements", "balls", "around", "solid"),
     *("camera", "pace", "surface", "viewer", "dom", "steer", "controls", "page"),
 )
@@ -82,7 +82,7 @@ def packed(data: bytes) -> str:
     return base64.b64encode(zlib.compress(data, 9)).decode()
 
 
-OUTLINE_SIDES = 12, 24  # the last is `SIDE` in plane.glsl
+MOST_CELLS = 24  # along an axis of the grid of an outline
 
 
 def shapes_of(elements: Iterable[Element | Gradient], store: ArrayStore) -> list[dict[str, Any]]:
@@ -103,12 +103,14 @@ def paints_of(elements: Iterable[Element | Gradient], store: ArrayStore) -> list
 
 
 def _shape(element: Element, store: ArrayStore) -> dict[str, Any]:
-    if element.form == "outline":
-        table, curves = table_of(element, OUTLINE_SIDES), curves_of(element)
+    if element.curved:
+        table, curves = table_of(element, MOST_CELLS), curves_of(element)
         wide, high = (float(side) for side in abs(curves).max((0, 1)))
+        lists = table.first, table.begins, table.near, table.passing
         return {
-            **{"name": element.name, "kind": "outline", "dimension": 2},
-            "cells": store.add(np.concatenate([table.first, table.near]).astype(np.int32)),
+            **{"name": element.called, "kind": "outline", "dimension": 2, "cellsAlong": table.side},
+            "cells": store.add(np.concatenate(lists).astype(np.int32)),
+            "posts": store.add(np.ascontiguousarray(table.posts.T).reshape(-1)),
             "pieces": store.add(np.ascontiguousarray(table.pieces.T).reshape(-1)),
             "bounds": (wide, high, 1.0),
         }
@@ -174,7 +176,7 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
     else:
         scales = read_ways(program.vectors, layout).scale.tolist()
     widths = widths_of(program.tokens.astype(np.intp) & OPERATOR, parts.width).tolist()
-    rows, skins = [], read_skins(parts)
+    rows, skins = [], read_skins(parts, program.brought())
     for i, (v, worn, form) in enumerate(zip(program.vectors, program.worn, program.forms, strict=True)):  # type: ignore[arg-type]
         row = {
             "token": int(program.tokens[i]),

@@ -16,7 +16,7 @@ from functools import cache
 from typing import Any, Final, TypeVar
 from unicodedata import normalize
 
-from scenelang.assets.element import Element, Gradient
+from scenelang.assets.element import BY_POINTS, Element, Gradient
 from scenelang.assets.element_file import load_textures, name_of
 from scenelang.assets.records import Record, deep_stack
 from scenelang.compiler.manifest import Manifest
@@ -386,6 +386,11 @@ class Writer:
         if head == "move":
             return self._move(stmt, scope, kind == "material")
         body = None if stmt.body is None else self.block(stmt.body, scope, "object")
+        if bound is None and name in words.OUTLINES:
+            if self.manifest.dimension == 3:
+                return ["no", f"`{name}` is a leaf of the plane"]
+            points = self.given(bind(words.OUTLINES[name].params, stmt.args), scope)
+            return ["outline", name, *points, body or []]
         if bound is None or head == "leaf":
             if name not in self.manifest.geometries:
                 return ["no", f"model `{self.manifest.name}` has no geometry `{name}`"]
@@ -534,6 +539,11 @@ def form_of(
         "graded": [int(isinstance(paint, Gradient)) for paint in writer.paints],
         "blends": manifest.any_blend,
         "fonts": fonts,
+        "outlines": [
+            [e.form, len(manifest.geometries) + at, [n for point in e.points for n in point]]
+            for at, e in enumerate(writer.shapes)
+            if e.form in BY_POINTS
+        ],
         "turns": [manifest.limits.get("inner_warps", 0), manifest.limits.get("outer_warps", 0)],
     }
     shown = [one for one in writer.params if id(one[3]) in needed or one[0] in reasons]

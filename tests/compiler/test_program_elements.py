@@ -52,7 +52,7 @@ def test_damaged_files() -> None:
     refused(program_bytes(compiled()), [
         (lambda h, t: h.update(format=1), "elements in a file of format 1"),
         (lambda h, t: h.update(format=3), "other tensors than a program of format 3"),
-        (lambda h, t: h.update(format=6), "not of format 1 or 2 or 3 or 4 or 5"),
+        (lambda h, t: h.update(format=7), "not of format 1 or 2 or 3 or 4 or 5 or 6"),
         (lambda h, t: h.pop("elements"), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[["ring"]]), "list of elements is damaged"),
         (lambda h, t: h.update(elements=[]), "other tensors"),

@@ -275,6 +275,15 @@ def test_references_and_highlights_mean_the_same_name(client: Client, uri: str, 
     assert sorted(mark["kind"] for mark in marks) == [2, 2, 3]
 
 
+def test_shapes_by_points_are_offered_and_told(client: Client, folder: Path) -> None:
+    text = "poly\npolygon([[0, 0], [1, 0], [0, 1]]);\nspline([[0, 0], [1, 0], [0, 1]]) { grow(2); }\n"
+    uri = client.open((folder / "points.nsg").as_uri(), text)
+    assert {"polygon", "spline"} <= {*labels(client, client.at(uri, "poly", 4))}
+    says(client, uri, [("polygon", 1, ["polygon(points)", "winding number", "`points`", "flat scenes"])])
+    found = client.request("textDocument/signatureHelp", client.at(uri, "spline([", 8))
+    assert found["signatures"][0]["label"] == "spline(points)"
+
+
 def test_a_font_brings_text_and_width(client: Client, folder: Path) -> None:
     text = 'import "std/letters" as abc;\nlet w = abc.width("A");\nabc.text("A", size = w);\n'
     text += "square { scale(abc.); }\nabc.;\n"

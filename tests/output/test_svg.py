@@ -72,6 +72,20 @@ def test_a_square_is_four_lines() -> None:
         assert min(abs(y - 64), abs(y - 192)) < 0.3
 
 
+def test_polygons_and_splines_are_as_they_are_written() -> None:
+    star = "[for (i in 0..<5) [cos(i * 144deg), sin(i * 144deg)]]"
+    text = f"""canvas(400, 400); polygon([[-1, -1], [0, -1], [0, 0.5]]) {{ translate(0.1, 0.2); material flat
+        {{ color(#d33); }} }} polygon({star}); spline([[0, 0], [0.6, 0], [0.6, 0.6], [0, 0.6]]) {{
+        rotate(90deg); }}
+        subtract {{ polygon({star}) {{ scale(0.1); }} spline([[0, 0], [1, 0], [0, 1]]); }}"""
+    svg = scenelang.to_svg(scenelang.loads(text))
+    triangle, whole, smooth, cut = re.findall(r'<path d="([^"]*)"', svg)
+    assert triangle == "M20 360L220 360L220 60z"
+    assert smooth.startswith("M200 200C220 180 220 100 200 80C")
+    assert whole.count("L") == 4  # whose middle SVG fills too, by the same rule
+    assert "L" not in cut
+
+
 def fold(stream: list[Operand], d: np.ndarray) -> tuple[float, int]:
     """Distance of a fold, and the row whose colour it has, by the rules of the language."""
     distance, shown = 0.0, -1

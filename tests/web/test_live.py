@@ -392,6 +392,23 @@ def test_texts_that_a_scene_puts_together(viewer_page: Any) -> None:
     assert check_cases(viewer_page, SourceFile("scene.nsg", long), [({}, 0), ({"n": 13}, 0)]) == 1
 
 
+OUTLINES = """param n = 1 in 0..3; let kite = [[3, 0], [4, 1], [3, 3], [2, 1], [2, 1]];
+module twice(points) { polygon(points) { grow(n); scale(0.2); } spline(points) { shell(3); rotate(30deg); } }
+group { twice(kite); polygon([[-1, -1], [1, -1], [0, 1]]) { twirl(n); material checker { scale(n + 1); } } }
+for (i in 0..<3) { spline([[i, 0], [i + 1, 2], [0, 3]]) { translate(n, 0); material radial {
+  stop(0, #fff); stop(1, #000); translate(2, 0); } } }"""
+
+
+def test_polygons_and_splines(viewer_page: Any) -> None:
+    source = SourceFile("scene.nsg", OUTLINES)
+    assert check_cases(viewer_page, source, [({}, 0), ({"n": 2.5}, 0)]) == 2
+    moving = drawable(SourceFile("scene.nsg", "param n = 1; polygon([[n, 0], [2, 0], [1, 1]]);"))
+    assert moving is not None
+    [[same, other]] = pictures(viewer_page, [(moving[0], [{}, {"params": {"n": 0.5}}])])
+    assert len(same["rows"]) == 1
+    assert "points" in other
+
+
 MODEL = load_manifest("shapes2d")
 LITERALS = """0 1 2 3 0.5 -1 -2.5 7 1e-3 10 0.1 -0 1e200 255 30deg -45deg 0.5rad 0.25turn 0deg 2s 40ms -1s 0s
     [1,2] [0,1,0.5] X #d33 #7a5c3e [] [1,[2,3]] [10deg,20deg] [-1,0.5] true false "a" "day" "ä😀" none PI TAU

@@ -276,6 +276,26 @@ def test_letters_of_the_page_are_those_of_the_field(page: Any) -> None:
     assert compared(page, program) > LEAST_DB[2]
 
 
+OUTLINES = """canvas(160, 120); background(#fed); let lean = 5deg;
+    let star = [for (i in 0..<5) [cos(i * 144deg), sin(i * 144deg)]];
+    module sail(at) {
+      polygon([[0, 0], [3, 0.5], [1, 4]]) { shell(0.3); grow(0.1); scale(0.1); translate(at); } }
+    polygon(star) { grow(0.05); scale(0.5); material linear { stop(0, #d33); stop(1, #33d); scale(0.5); } }
+    smooth { spline([[5, 5], [9, 6], [7, 9]]) { scale(0.1); rotate(lean); material flat { color(#2a7); } }
+      sail([0.4, 0.5]);
+      spline([[-1, 0], [1, 0], [1, 1], [-1, -1]]) { scale(0.3); translate(0.9, 0.2); twirl(0.5); } }
+    sail([-0.9, -0.7]);"""
+
+
+@pytest.mark.browser
+def test_polygons_and_splines_of_the_page_are_those_of_the_field(page: Any) -> None:
+    program = nsg.compile(nsg.loads(OUTLINES))
+    p = np.random.default_rng(4).uniform(-1.3, 1.3, (2000, 2))
+    off = abs(answered(page, program, p)[:, 0] - asked(program, p)[:, 0])
+    assert off.max() < 1e-4
+    assert compared(page, program) > LEAST_DB[2]
+
+
 @pytest.mark.browser
 def test_elements_of_the_plane_grow_on_the_page(page: Any, tmp_path: Path) -> None:
     zoo = element_file_bytes([element(square, "tile", d=2)])

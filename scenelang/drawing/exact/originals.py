@@ -153,7 +153,7 @@ def originals_of(scene: Scene, graph: Graph) -> dict[str, Shape]:
     environment's `FOLDER` names, or beside the file of elements. Raises `FitError` and `OSError`.
     """
     shown = {leaf.geometry for leaf in leaves(graph.root)} & graph.elements.keys()
-    shown = {name for name in shown if graph.elements[name].form != "outline"}
+    shown = {name for name in shown if not graph.elements[name].curved}
     beside = {file.name: file.zoo.folder for file in scene.elements if file.zoo is not None}
     folders = {name: os.environ.get(FOLDER) or beside[name.partition(".")[0]] for name in sorted(shown)}
     return {name: _original(name, graph.elements[name], folder) for name, folder in folders.items()}

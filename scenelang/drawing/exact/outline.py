@@ -23,7 +23,7 @@ import numpy as np
 import numpy.typing as npt
 from PIL import ExifTags, Image, ImageCms, ImageColor, ImageOps, UnidentifiedImageError, features
 
-from scenelang.assets.element import TEXELS, Element, Facts, Painted
+from scenelang.assets.element import TEXELS, Element, Facts, Painted, splined
 from scenelang.assets.element_file import Font, FontError, load_element_file
 from scenelang.assets.picture import frame_of, painted, texels
 from scenelang.assets.pyramid import curves_of
@@ -173,6 +173,8 @@ PIECE: Final = 0.004  # leaf units: longer edges are cut, so that the nearest mi
 STRIP: Final = 64  # points of neighbouring heights
 _TOGETHER: Final = 10_000  # edges that are asked at a time
 _FINE: Final = 0.002  # leaf units: longest edge along a curve of an element
+_FEW_EDGES: Final = 32  # of which all are asked
+_FLAT: Final = 4e-6  # leaf units: farthest that edges lie off a spline
 _BESIDE: Final = 1e-4  # leaf units from an edge to where its sides are asked
 Edges = npt.NDArray[np.float64]  # (E, 2, 2): edges, ends, coordinates
 Inside = Callable[[Points], npt.NDArray[np.bool_]]
@@ -304,7 +306,6 @@ class Outline:
         return result, out, thin
 
 
-@lru_cache(maxsize=256)
 def of_curves(element: Element) -> Outline:
     """The outline of an element of quadratic curves, in its own disc."""
     a, b, c = curves_of(element).swapaxes(0, 1)
@@ -316,6 +317,56 @@ def of_curves(element: Element) -> Outline:
         edges.append(np.stack([points[:-1], points[1:]], 1))
     joined = np.concatenate(edges)
     return Outline([Layer(joined, winding(joined, odd=False))], disc=((0.0, 0.0), 1.0))
+
+
+class PointShape:
+    """A polygon or a spline by its points, the spline flattened to `_FLAT` of its radius; every edge counts,
+    also one that others cover.
+    """
+
+    dimension = 2
+
+    def __init__(self, element: Element) -> None:
+        with needed("scipy"):
+            from scipy.spatial import cKDTree
+        line = np.array(element.points)
+        if element.form == "spline":
+            a, b, c, d = np.array(splined(element.points)).swapaxes(0, 1)
+            bend = np.maximum(np.hypot(*(a - 2 * b + c).T), np.hypot(*(b - 2 * c + d).T))
+            count = np.ceil(np.sqrt(0.75 * bend / _FLAT)).astype(int).clip(1)
+            which = np.repeat(np.arange(len(a)), count)
+            t = ((np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count)) / count[which])[:, None]
+            s, (a, b, c, d) = 1 - t, (at[which] for at in (a, b, c, d))
+            line = s**3 * a + 3 * s * s * t * b + 3 * s * t * t * c + t**3 * d
+        edges = np.stack([line, np.roll(line, -1, 0)], 1)
+        self.inside, self._few = winding(edges, odd=False), len(edges) <= _FEW_EDGES
+        self._pieces = edges if self._few else Layer(edges, None).pieces()
+        self._ends, self._middles = cKDTree(self._pieces[:, 0]), cKDTree(self._pieces.mean(1))
+
+    def distances(self, p: Points) -> Points:
+        """Signed distances (M,) of points (M, 2), negative inside."""
+        if self._few:
+            away = np.full(len(p), np.inf)
+            for a, c in self._pieces:
+                away = np.minimum(away, _from_edges(p, a, c - a))
+        else:  # where it is no end that is nearest, the middle of its piece is farther by h^2 / 2 d at most
+            near = self._middles.query(p, k=6)[1]
+            a, along = self._pieces[near, 0], np.diff(self._pieces[near], axis=2)[:, :, 0]
+            away = np.minimum(_from_edges(p[:, None], a, along).min(1), self._ends.query(p)[0])
+        return np.where(self.inside(p), -away, away)
+
+
+def _from_edges(p: Points, a: Points, along: Points) -> Points:
+    """Distances of points (…, 2) from edges by their starts and ways (…, 2)."""
+    share = ((p - a) * along).sum(-1) / np.maximum((along * along).sum(-1), 1e-300)
+    off = a + share.clip(0, 1)[..., None] * along - p
+    return np.asarray(np.hypot(off[..., 0], off[..., 1]))
+
+
+@lru_cache(maxsize=256)
+def of_element(element: Element) -> Outline | PointShape:
+    """The true shape of what is `curved`."""
+    return of_curves(element) if element.form == "outline" else PointShape(element)
 
 
 def _moved(inside: Inside, middle: Points, size: float) -> Inside:

@@ -19,7 +19,7 @@ import numpy as np
 from scenelang.compiler.graph import Graph, Node, leaves
 from scenelang.compiler.spaces import LIFT, Light, Stage
 from scenelang.drawing.exact.field import Array, Brought, evaluate, parts, sample_points
-from scenelang.drawing.exact.outline import of_curves
+from scenelang.drawing.exact.outline import of_element
 from scenelang.drawing.exact.solid import (
     OPAQUE,
     TILE,
@@ -89,9 +89,9 @@ def true_shapes(graph: Graph, brought: Brought | None) -> Brought:
     result = dict(brought or {})
     for leaf in leaves(graph.root):
         if (element := graph.elements.get(name := leaf.geometry)) is not None and name not in result:
-            if element.form != "outline":
+            if not element.curved:
                 raise ValueError(f"the exact shape of `{name}` is not known")
-            result[name] = of_curves(element)
+            result[name] = of_element(element)
     return result
 
 

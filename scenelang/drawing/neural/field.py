@@ -61,7 +61,7 @@ class Field:
         self.frames = Frames(vectors[:, : layout.geometry], layout)
         cuts = np.append(self.groups.joins > SMOOTH, False)  # of no group, too
         self.draws = (self.tokens <= SMOOTH) & ~cuts[self.groups.path].any(1)
-        self.skins = read_skins(self.parts)
+        self.skins = read_skins(self.parts, self.brought)
         self.skinned = np.zeros(len(vectors), bool) if self.skins is None else np.any(self.skins[:3], axis=0)
         self.opacity = np.where(self.draws, 1.0 - self.parts.clear, 1.0).clip(0.0, 1.0).astype(np.float32)
         self.clear = bool((self.opacity < 1.0).any())
@@ -90,7 +90,7 @@ class Field:
         elements = dict.fromkeys(element for element in self.brought if element is not None)
         if elements and network.config.features != 1:
             raise ProgramError("elements for a network that knows more than distances")
-        outlines = {element: at for at, element in enumerate(e for e in elements if e.form == "outline")}
+        outlines = {element: at for at, element in enumerate(e for e in elements if e.curved)}
         self.outline = np.array([outlines.get(held, -1) for held in self.brought], np.intp)  # type: ignore[arg-type]
         """Numbers of outlines among all that are drawn together (N,), -1 for other shapes."""
         for element in elements:

@@ -12,6 +12,7 @@ from typing import Any, NamedTuple
 import numpy as np
 import numpy.typing as npt
 
+from scenelang.assets.element import BY_POINTS, Element
 from scenelang.compiler.lifting import PLANE_LAYOUT, STRENGTHS, Layout, Parts
 from scenelang.compiler.program import ProgramError
 from scenelang.drawing.arrays import NUMPY, Array, Arrays
@@ -227,12 +228,15 @@ class Skins(NamedTuple):
         return xp.select((d < 0.0) & (self.wall > 0.0), -d, d) - (self.wall + self.last)
 
 
-def read_skins(parts: Parts) -> Skins | None:
-    """The skins of vectors' parts, None where no object has one; raises `ProgramError` for a damaged one."""
+def read_skins(parts: Parts, brought: Sequence[Element | None] = ()) -> Skins | None:
+    """The skins of vectors' parts, None where no object has one; raises `ProgramError` for a damaged one.
+    Those of ``brought`` shapes by points may be of any size.
+    """
     grow, shell, order = (np.asarray(part, np.float32) for part in (parts.grow, parts.shell, parts.order))
     if not (grow.any() or shell.any() or order.any()):
         return None
-    known = (abs(grow - 0.25) <= 0.75) & (shell >= 0.0) & (shell <= 1.0) & np.isin(order, range(4))
+    free = np.array([held is not None and held.form in BY_POINTS for held in brought] or [False])
+    known = (free | ((abs(grow - 0.25) <= 0.75) & (shell <= 1.0))) & (shell >= 0.0) & np.isin(order, range(4))
     if not known.all():
         raise ProgramError("a damaged program: a leaf that grows, or a shell, beyond what there is")
     behind = order.astype(int)

@@ -35,9 +35,9 @@ SHAPE: Final = dtype_of(
     "i4 flags leaf step steps texture depth path[15]",
 )
 LEAF: Final = dtype_of(
-    "i4 kind units size[9] inner features feature[10] width",
+    "i4 kind units size[9] inner features feature[10] width side",
     "f4 radius slope line[27,11] steep[27] whole[9]",
-    "u8 data first near",
+    "u8 data first near posts begins passing",
 )
 JOINT: Final = dtype_of("i4 flags", "f4 own[3] past[3] bias[3] candidate bump width stretch")
 FLAT: Final = dtype_of(
@@ -118,7 +118,7 @@ class FlatTables(Held):
     def _leaves(self, field: Field) -> tuple[Rows, np.ndarray]:
         """Rows of decoders, and which of them each object has."""
         keys = [
-            (shape, held if held is not None and held.form == "outline" else None)
+            (shape, held if held is not None and held.curved else None)
             for shape, held in zip(field.shape.tolist(), field.brought, strict=True)
         ]
         number = {key: at for at, key in enumerate(dict.fromkeys(keys))}
@@ -140,12 +140,13 @@ class FlatTables(Held):
     def _outline(self, row: Rows, element: Element) -> None:
         table = table_of(element)
         pieces = np.zeros((table.pieces.shape[1], 16), np.float32)
-        pieces[:, :10] = table.pieces.T
-        pieces[:, 10:12] = way = pieces[:, 2:4] + pieces[:, 4:6]
+        pieces[:, :8] = table.pieces.T
+        pieces[:, 10:12] = way = pieces[:, 6:8] - pieces[:, :2]
         pieces[:, 12] = 1 / np.maximum((way * way).sum(1), 1e-12)
-        row["kind"], row["width"], row["slope"] = OUTLINE, len(pieces), 1.05
-        row["data"] = self.held(pieces)
-        row["first"], row["near"] = (self.held(part.astype(np.int32)) for part in (table.first, table.near))
+        row["kind"], row["width"], row["side"], row["slope"] = OUTLINE, len(pieces), table.side, 1.05
+        row["data"], row["posts"] = self.held(pieces), self.held(table.posts)
+        for name in ("first", "near", "begins", "passing"):
+            row[name] = self.held(getattr(table, name).astype(np.int32))
 
 
 def tables_of(field: Field) -> FlatTables:

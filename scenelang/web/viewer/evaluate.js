@@ -6,8 +6,10 @@ import { bare, equal, kindOf, numbersOf, radians } from "./values.js";
 import { refuse, sameUnit, sizeOf, truth, unitOf } from "./values.js";
 import { entering, looping, prepared } from "./expressions.js";
 import { lineOf } from "./letters.js";
+import { outlineOf } from "./outlines.js";
 import { MAPS } from "./maps.js";
 import { MOST_OBJECTS, USUAL_BLEND, rowsOf } from "./graph.js";
+import { isOwn } from "./chain.js";
 import { sharesOf, stageFrom } from "./stage.js";
 import { checkEye } from "./eye.js";
 
@@ -109,10 +111,13 @@ class SceneRun {
   }
 }
 
-/** What the statements of a block put into their node; `op` and `k` join the next child. */
+/**
+ * What the statements of a block put into their node; `op` and `k` join the next child, `free` is that of a
+ * polygon or a spline.
+ */
 class Block {
-  constructor(op = "union", k = 0) {
-    Object.assign(this, { op, k, links: [], steps: [], worn: null, moved: false });
+  constructor(op = "union", k = 0, free = false) {
+    Object.assign(this, { op, k, free, links: [], steps: [], worn: null, moved: false });
   }
 
   add(node) {
@@ -183,13 +188,13 @@ function allowedBy(value, allowed) {
 }
 
 /** A transform of objects as its step. */
-function stepOf(name, values) {
+function stepOf(name, values, free = false) {
   if (name in MAPS) return { rows: MAPS[name](values) };
   const [a, b] = values.map(bare);
   if (name === "twirl") return { twirl: a, x: 0, y: 0 };
   if (name === "bend") return { twirl: 0, x: a, y: 0 };
-  if (name === "grow") return a >= -0.5 && a <= 1 ? { grow: a } : refuse(`a growth of ${a}`);
-  if (name === "shell") return a > 0 && a <= 1 ? { shell: a } : refuse(`a wall of ${a}`);
+  if (name === "grow") return free || (a >= -0.5 && a <= 1) ? { grow: a } : refuse(`a growth of ${a}`);
+  if (name === "shell") return a > 0 && (free || a <= 1) ? { shell: a } : refuse(`a wall of ${a}`);
   return name === "twist" ? { twist: a } : { amount: a, frequency: b };
 }
 
@@ -265,6 +270,22 @@ const STATEMENTS_OF_FORMS = {
       out.add({ shape, steps: inside.steps, worn: inside.worn });
     };
   },
+  outline: ([kind, expr, block], run) => {
+    const [get, act] = [prepared(expr, run), actionsOf(block, run)];
+    return (slots, out) => {
+      const inside = new Block("union", 0, true), points = get(slots);
+      run.weigh([points]);
+      act(slots, inside);
+      run.objects += 1;
+      if (run.objects > MOST_OBJECTS) refuse(`more than ${MOST_OBJECTS} objects`);
+      const { shape, radius, there } = outlineOf(kind, points, run.form), { steps, worn } = inside;
+      const own = steps.findIndex((step) => !isOwn(step)), first = own < 0 ? steps.length : own;
+      const sized = steps.slice(0, first).map((step) => {
+        return step.grow === undefined ? { shell: step.shell / radius } : { grow: step.grow / radius };
+      });
+      out.add({ shape, there, worn, steps: [...sized, { rows: there }, ...steps.slice(first)] });
+    };
+  },
   node: ([kind, k, block], run) => {
     const op = kind === "group" || kind === "chain" ? "union" : kind;
     const [width, act] = [widthOf(op, k, run), actionsOf(block, run)];
@@ -334,7 +355,7 @@ const STATEMENTS_OF_FORMS = {
       run.spend(1);
       out.moved = true;
       const values = parts.map((part) => part(slots));
-      out.steps.push(name in INKS ? INKS[name](values) : stepOf(name, values));
+      out.steps.push(name in INKS ? INKS[name](values) : stepOf(name, values, out.free));
     };
   },
   animate: (args, run) => {

@@ -68,7 +68,10 @@ function loweredLeaf(node, steps, worn, state) {
   const { form, looks } = state;
   state.objects += 1;
   if (state.objects > MOST_OBJECTS) refuse(`more than ${MOST_OBJECTS} objects`);
-  const wears = worn ?? state.plain;
+  let wears = worn ?? state.plain;
+  if (node.there && wears.paint >= 0) { // in whose own units textures are
+    wears = new Wearing(wears.lit, wears.paint, [...wears.ops, { rows: invertedMap(node.there) }]);
+  }
   if (!looks.has(wears)) looks.set(wears, lookOf(wears, form));
   return {
     leaf: true,

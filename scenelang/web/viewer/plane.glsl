@@ -147,43 +147,67 @@ float grown(vec2 q, int first, int side) {
 #endif
 
 #ifdef OUTLINES
-const int SIDE = 24; // cells of an outline's grid along an axis, as in scenelang/web/arrays.py
 const float WIDE = 4.0 / 3.0, LAST = 16.0; // as in scenelang/drawing/neural/outlines.py
 
-/** A distance by curves: where lists begin, cell by cell, lists of pieces, and of each piece ten numbers. */
+vec2 pair(int at) {
+  return vec2(node(at), node(at + 1));
+}
+
+float cross2(vec2 a, vec2 b) {
+  return a.x * b.y - a.y * b.x;
+}
+
+/** A step of Newton's method towards the nearest point of a curve. */
+float nearer(vec2 a, vec2 u, vec2 w, float t, vec2 q) {
+  vec2 off = a + t * (u + t * w) - q, way = u + 2.0 * t * w;
+  float speed = dot(way, way), bend = max(speed + 2.0 * dot(off, w), 0.25 * speed);
+  return clamp(t - dot(off, way) / max(bend, 1e-12), 0.0, 1.0);
+}
+
+/**
+ * A distance by curves, see scenelang/drawing/neural/outlines.py: how many cells there are along an axis, their
+ * posts, where their lists of what may be nearest begin, and of what passes them, these lists, and pieces.
+ */
 float outlined(vec2 q, int first) {
   float radius = length(q), least = FAR, t = 0.0;
   q *= LAST / max(radius, LAST);
   vec2 place = clamp(q, -1.0, 1.0) * (WIDE - (WIDE - 1.0) / max(abs(q), vec2(1.0)));
-  ivec2 at = clamp(ivec2((place + WIDE) * (float(SIDE) / (2.0 * WIDE))), 0, SIDE - 1);
-  int cell = first + at.y * SIDE + at.x, lists = first + SIDE * SIDE + 1;
-  int pieces = lists + int(node(lists - 1)), end = lists + int(node(cell + 1)), best = pieces;
-  for (int k = lists + int(node(cell)); k < end; k++) {
-    int piece = pieces + 10 * int(node(k));
-    vec2 off = q - vec2(node(piece), node(piece + 1));
-    vec2 way = vec2(node(piece + 2) + node(piece + 4), node(piece + 3) + node(piece + 5));
-    float share = clamp(dot(off, way) / max(dot(way, way), 1e-12), 0.0, 1.0);
-    off -= share * way;
-    SPEND(12);
+  int side = int(node(first)), cells = side * side, starts = first + 1 + 3 * cells;
+  ivec2 at = clamp(ivec2((place + WIDE) * (float(side) / (2.0 * WIDE))), 0, side - 1);
+  int cell = at.y * side + at.x, passes = starts + cells + 1, lists = passes + cells + 1;
+  int passing = lists + int(node(passes - 1)), pieces = passing + int(node(lists - 1)), best = pieces;
+  int end = lists + int(node(starts + cell + 1));
+  for (int k = lists + int(node(starts + cell)); k < end; k++) {
+    int piece = pieces + 8 * int(node(k));
+    vec2 a = pair(piece), u = pair(piece + 2), w = pair(piece + 4), way = pair(piece + 6) - a;
+    float share = clamp(dot(q - a, way) / max(dot(way, way), 1e-12), 0.0, 1.0);
+    if (w != vec2(0)) share = nearer(a, u, w, share, q);
+    vec2 off = a + share * (u + share * w) - q;
+    SPEND(20);
     if (dot(off, off) >= least) continue;
     least = dot(off, off);
     best = piece;
     t = share;
   }
-  vec2 a = vec2(node(best), node(best + 1)), u = vec2(node(best + 2), node(best + 3));
-  vec2 w = vec2(node(best + 4), node(best + 5)), off, way;
-  for (int step = 0; step < 3; step++) {
-    off = a + t * (u + t * w) - q;
-    way = u + 2.0 * t * w;
-    if (step == 2) break;
-    float speed = dot(way, way), bend = max(speed + 2.0 * dot(off, w), 0.25 * speed);
-    t = clamp(t - dot(off, way) / max(bend, 1e-12), 0.0, 1.0);
+  vec2 post = pair(first + 1 + 3 * cell), walk = q - post;
+  float turns = node(first + 3 + 3 * cell);
+  end = passing + int(node(passes + cell + 1));
+  for (int k = passing + int(node(passes + cell)); k < end; k++) {
+    int item = int(node(k)), piece = pieces + 8 * (item / 2);
+    vec2 a = pair(piece), w = pair(piece + 4), c = pair(piece + 6), way = c - a, v = q - a;
+    float beside = cross2(way, v), bent = cross2(way, w), off = cross2(v, w);
+    bool left = beside >= 0.0;
+    SPEND(16);
+    if ((cross2(walk, a - post) >= 0.0) != (cross2(walk, c - post) >= 0.0) && left != (item % 2 == 1)) {
+      turns += left ? 1.0 : -1.0;
+    }
+    if (left != bent > 0.0 && off * off < bent * (beside + off)) turns -= left ? 1.0 : -1.0;
   }
-  SPEND(60);
-  if (t <= 0.0) way = vec2(node(best + 6), node(best + 7));
-  if (t >= 1.0) way = vec2(node(best + 8), node(best + 9));
-  float away = length(off);
-  return (way.y * off.x - way.x * off.y > 0.0 ? -away : away) + max(radius - LAST, 0.0);
+  vec2 a = pair(best), u = pair(best + 2), w = pair(best + 4);
+  t = nearer(a, u, w, t, q);
+  float away = length(a + t * (u + t * w) - q);
+  SPEND(40);
+  return (abs(turns) > 0.5 ? -away : away) + max(radius - LAST, 0.0);
 }
 #endif
 

@@ -263,7 +263,8 @@ const isOutline = ({ kind }) => kind === "outline";
 
 /** What the shader knows of a shape that was brought: distances, or cells and pieces of its curves. */
 function nodesOf(shape) {
-  return isOutline(shape) ? joined([shape.cells, shape.pieces], Float32Array)[0] : distances(shape);
+  if (!isOutline(shape)) return distances(shape);
+  return joined([[shape.cellsAlong], shape.posts, shape.cells, shape.pieces], Float32Array)[0];
 }
 
 /** Arrays of a kind one after the other, and where each begins. */
