@@ -61,12 +61,6 @@ def light_fault(power: float) -> str | None:
 OWN_RANGES: Final = {"grow": (-0.5, 1.0), "shell": (0.0, 1.0)}
 """Ranges of what changes a leaf's own distance; of polygons and splines it may be any number."""
 
-
-def own_range(kind: str) -> str:
-    low, high = OWN_RANGES[kind]
-    return f"{low:g} to {high:g} but of a polygon or spline"
-
-
 _NOT_0: dict[str, Any] = {"not": {"const": 0}}
 _NOT_000: dict[str, Any] = {"not": {"const": [0, 0, 0]}}
 
@@ -378,14 +372,14 @@ class Grow(Frozen):
     """Takes ``r`` off the leaf's own distance, so that its edge moves out by it; first, before any move."""
 
     kind: Literal["grow"] = _kind("grow")
-    r: Annotated[Finite, Field(description=f"leaf units, {own_range('grow')}; below 0 the leaf shrinks")]
+    r: Annotated[Finite, Field(description="leaf units, -0.5..1 unless by points; below 0 it shrinks")]
 
 
 class Shell(Frozen):
     """Keeps what is within ``w`` / 2 of the leaf's edge; first, before any move."""
 
     kind: Literal["shell"] = _kind("shell")
-    w: Annotated[Finite, Field(gt=0, description=f"leaf units, {own_range('shell')}; half on either side")]
+    w: Annotated[Finite, Field(gt=0, description="leaf units, up to 1 unless by points; half on either side")]
 
 
 Transform = Annotated[
