@@ -39,7 +39,7 @@ typedef struct {  // gates: that of distance, two of colour, two of the kind of 
 } Cell;
 typedef struct {
     int32_t kind, wide, high, stops, steps;  // sides of texels, or of colours of space; numbers of stops and steps
-    float place[6];  // from leaf coordinates x and y to the picture
+    float place[8];  // from leaf coordinates to the picture
     const float *data, *step;  // texels (3, high, wide), nodes (3, n, n, n) or stops (k, 4); steps (k, 4)
 } Texture;
 typedef struct { int32_t ray; float begin, end, before, sigma; } Piece;  // of a ray in media; optical depth before it over sigma

@@ -30,7 +30,7 @@ static V operated(const Texture *t, V c) {
 static V coloured(const Texture *t, V q) {
     F r[3];
     const float *m = t->place;
-    F u = m[0] * q.x + m[1] * q.y + m[2], v = m[3] * q.x + m[4] * q.y + m[5];
+    F u = m[0] * q.x + m[1] * q.y + m[2] * q.z + m[3], v = m[4] * q.x + m[5] * q.y + m[6] * q.z + m[7];
     if (t->kind == SPACE) {
         V share;
         M first = cell_of(t->wide, cubed(q, 1), &share);

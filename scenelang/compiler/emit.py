@@ -13,7 +13,15 @@ from scenelang.assets.element import Element, Gradient
 from scenelang.compiler.chain import split_levels
 from scenelang.compiler.graph import Fold, Graph, Later, Leaf, Row
 from scenelang.compiler.groups import BEGINS, ENDS
-from scenelang.compiler.lifting import LAYOUTS, WIDTH, lift_colours, lift_geometry, lift_many, lift_material
+from scenelang.compiler.lifting import (
+    LAYOUTS,
+    WIDTH,
+    lift_colours,
+    lift_geometry,
+    lift_many,
+    lift_material,
+    texture_frame,
+)
 from scenelang.compiler.manifest import Manifest
 from scenelang.compiler.program import Paint, Place, Program, ProgramError
 from scenelang.compiler.spaces import SPACES
@@ -73,7 +81,8 @@ def _palette(leaves: list[Leaf]) -> tuple[tuple[Paint, ...], npt.NDArray[np.int3
             element = look.element
             if isinstance(element, Gradient):
                 element = Gradient(element.name, tuple(map(_rounded, element.stops)))
-            known[id(look)] = result.setdefault(Paint(element, tuple(steps)), len(result))
+            paint = Paint(element, tuple(steps), _rounded(texture_frame(look.moved)[1]))
+            known[id(look)] = result.setdefault(paint, len(result))
     return tuple(result), np.array([known[id(leaf.look)] for leaf in leaves], np.int32)
 
 

@@ -24,7 +24,7 @@ from typing import Any, NamedTuple, TypeVar, cast
 
 from scenelang.assets.element import Element, Gradient
 from scenelang.assets.records import Record
-from scenelang.compiler.spaces import Box, Space, Stage
+from scenelang.compiler.spaces import Box, Space, Stage, flattened
 from scenelang.compiler.steps import Affine, Rows, Step, composed
 from scenelang.language.diagnostics import Span
 from scenelang.language.scene import Color, Grayscale, Hue, MaterialOp
@@ -44,7 +44,7 @@ class Look(Record):
     """The material of an object: how it is lit, and the colour as written that operations start from.
 
     ``rgb`` in [0, 1] is white, or the result of a folded look; colours of a texture or a gradient
-    (``element``) stand instead. ``colours`` and ``texture``, moves over the leaf's x and y, have what was
+    (``element``) stand instead. ``colours`` and ``texture``, moves before x and y are taken, have what was
     written first first. ``opacity`` is the share, in [0, 1], that it hides of what lies behind. ``density``,
     ``roughness`` and ``glow`` are as in `Parts`; what reflects is ``diffuse`` with a roughness.
     """
@@ -69,7 +69,7 @@ class Look(Record):
             plain = (), self.colour(), None, ()
             return Look(self.material, *plain, *self.own) if self.texture or self.colours else self
         colours, moved = normal(self.colours), composed(self.texture)
-        texture = (Affine(moved),) if self.texture else ()
+        texture = (Affine(moved if moved[2] or moved[6] else flattened(moved)),) if self.texture else ()
         if (colours, texture) == (self.colours, self.texture):
             return self
         return Look(self.material, colours, self.rgb, self.element, texture, *self.own)
@@ -97,6 +97,11 @@ class Look(Record):
     @property
     def moved(self) -> Rows:
         return composed(self.texture)
+
+    @property
+    def tilted(self) -> bool:
+        """True where z makes a difference to its texture."""
+        return any(step.rows[2] or step.rows[6] for step in self.texture)
 
 
 def colour_steps(ops: Iterable[MaterialOp]) -> tuple[ColourStep, ...]:

@@ -34,7 +34,7 @@ import numpy.typing as npt
 
 from scenelang.assets.records import Record
 from scenelang.compiler.chain import Levels, slots
-from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Turn, Warp
+from scenelang.compiler.steps import IDENTITY, Affine, Rows, Step, Turn, Warp, inverted
 
 WIDTH: Final = 64  # numbers of an object
 STRENGTHS: Final = 3  # of a warp
@@ -131,6 +131,14 @@ def inverse_frame(rows: Rows, dimension: int) -> list[float]:
         raise ZeroDivisionError("a singular map") from None
 
 
+def texture_frame(rows: Rows) -> tuple[list[float], tuple[float, float]]:
+    """The frame (6,) of a texture that a map moves, from x and y to (u, v), and their rates along z."""
+    if not (rows[2] or rows[6]):
+        return inverse_frame(rows, 2), (0.0, 0.0)
+    a, b, p, x, c, d, q, y, *_ = inverted(rows)
+    return [a, b, x, c, d, y], (p, q)
+
+
 def lift_many(
     levels: Sequence[Levels], codes: Sequence[Sequence[float]], layout: Layout = PLANE_LAYOUT
 ) -> np.ndarray:
@@ -170,7 +178,7 @@ def lift_colours(
     texture = [PLANE_LAYOUT.identity] * count  # textures lie in a plane
     for at, map in enumerate(moved):
         if map is not IDENTITY:
-            texture[at] = tuple(inverse_frame(map, 2))
+            texture[at] = tuple(texture_frame(map)[0])
     rgb, material = (np.asarray(each, np.float64).reshape(count, -1) for each in (colours, codes))
     clear = 1.0 - np.asarray(opacities or [1.0] * count, np.float64)
     return layout.pack(count, texture=texture, rgb=rgb, clear=clear, material=material, **lights)

@@ -13,7 +13,7 @@ from scenelang.assets.records import Record
 from scenelang.compiler import graph, steps
 from scenelang.compiler.graph import BLACK, MOST_STEPS, Fold, Graph, Leaf, Link, Look, Move, coloured
 from scenelang.compiler.manifest import Manifest
-from scenelang.compiler.spaces import PLANE, REACH, SINGULAR, SPACES, Refusal, Space, decoded, stage_of
+from scenelang.compiler.spaces import PLANE, REACH, SHEET, SINGULAR, SPACES, Refusal, Space, decoded, stage_of
 from scenelang.compiler.steps import IDENTITY, Affine, Own, Rows, Shell, Step, compose, inverted, scaling
 from scenelang.language import nodes as schema
 from scenelang.language import words
@@ -391,20 +391,20 @@ class _Lowering(Record, frozen=False):
         self, material: schema.Material, element: Element | Gradient | None
     ) -> Iterator[Affine]:
         """The moves of a texture; a constant material's are checked too, colours of space have none."""
-        rows = IDENTITY
+        rows, space = IDENTITY, PLANE if self.space.dimension == 2 else SHEET
         for op in material.ops:
             if isinstance(op, schema.Color | schema.Grayscale | schema.Hue | schema.Stop):
                 continue
             if element is not None and element.dimension == 3:
                 fact = f"`{op.kind}` moves a texture, and `{material.name}` is a {element.kind}"
                 self.say("E0504", fact, op, "its colours lie on the shape: leave the move out")
-            elif isinstance(step := step_of(op, PLANE), Refusal):
+            elif isinstance(step := step_of(op, space), Refusal):
                 if step.code == "E0312" or element is not None:
                     self.say(step.code, step.message, op, step.help)
             elif isinstance(step, Affine):
                 rows = compose(step.rows, rows)
                 yield step
-        if not PLANE.usable(rows):
+        if not space.usable(rows):
             fact = f"the moves of the texture `{material.name}` compose to a singular one"
             self.say("E0406", fact, material, "scale less along one direction, or less often")
 

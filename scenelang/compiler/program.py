@@ -10,7 +10,8 @@ the index of each row's paint or -1. With groups, or cuts that have a width, it 
 where the others would; with gradients, whose ``stops`` F32 (S, 5) lie beside the paints, with numbers in the
 places `OTHERS` of vectors, ``samples`` other than 4, which the header then has, or a stage that has a sky or
 another count of lights than one, or one of a radius, it is format 5. With polygons or splines it is format 6:
-``outlines`` I32 (K, 3), place among the elements, kind and number of points, and ``points`` F64 (M, 2).
+``outlines`` I32 (K, 3), place among the elements, kind and number of points, and ``points`` F64 (M, 2). So
+it is where textures are tilted out of x and y, with ``tilts`` beside the paints.
 """
 
 from __future__ import annotations
@@ -55,20 +56,24 @@ _GRADED: Final = {-1: "linear", -2: "radial"}
 
 
 class Paint(NamedTuple):
-    """A gradient, a picture or colours of space, and `STEPS` on its colours, each clamped to [0, 1]."""
+    """A gradient, a picture or colours of space, `STEPS` on its colours, each clamped to [0, 1], and of a
+    texture in space how much its u and v change along z, beside the frame that its rows' vectors have.
+    """
 
     element: Element | Gradient
     steps: tuple[ColourStep, ...] = ()
+    tilt: tuple[float, float] = (0.0, 0.0)
 
 
 def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> dict[str, npt.NDArray[Any]]:
     """Tensors of paints: `paints` I32 (K, 2), element and number of steps; `steps` F32 (S, 4), in order; with
-    gradients, whose elements are -1 linear and -2 radial, `stops` F32 (S, 5), each behind its paint's index.
+    gradients, whose elements are -1 linear and -2 radial, `stops` F32 (S, 5), each behind its paint's index;
+    `tilts` F32 (K, 2) where there are any.
     """
     kinds, index = list(STEPS), {element: at for at, element in enumerate(elements)}
     graded = {name: at for at, name in _GRADED.items()}
     table, steps, stops = list[Any](), list[Any](), list[Any]()
-    for at, (element, own) in enumerate(paints):
+    for at, (element, own, _) in enumerate(paints):
         listed = graded[element.name] if isinstance(element, Gradient) else index[element]
         table.append((listed, len(own)))
         steps += [(kinds.index(kind), *numbers, *[0.0] * (3 - len(numbers))) for kind, *numbers in own]
@@ -77,6 +82,8 @@ def paint_tensors(paints: tuple[Paint, ...], elements: tuple[Element, ...]) -> d
         "paints": np.array(table, np.int32).reshape(-1, 2),
         "steps": np.array(steps, np.float32).reshape(-1, 4),
     }
+    if any(any(paint.tilt) for paint in paints):
+        tensors["tilts"] = np.array([paint.tilt for paint in paints], np.float32)
     return tensors | ({"stops": np.array(stops, np.float32)} if stops else {})
 
 
@@ -86,6 +93,9 @@ def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, .
     stops: dict[float, list[Any]] = {}
     for owner, *stop in tensors["stops"].tolist() if "stops" in tensors else ():
         stops.setdefault(owner, []).append(tuple(stop))
+    tilts = tensors.get("tilts", np.zeros_like(tensors["paints"], np.float32)).tolist()
+    if len(tilts) != len(tensors["paints"]):
+        raise TensorError("tilts of other paints than there are")
     if not all(kind in range(len(kinds)) for kind, *_ in rows):
         raise TensorError("a paint with a step that this version does not know")
     for row, (at, count) in enumerate(tensors["paints"].tolist()):
@@ -93,7 +103,8 @@ def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, .
         if not (graded or 0 <= at < len(elements)) or not 0 <= count <= min(MOST_STEPS, len(rows) - first):
             raise TensorError("a paint of an element or of steps that are not listed")
         named = [(kinds[int(kind)], *numbers) for kind, *numbers in rows[first : first + count]]
-        result.append(Paint(graded or elements[at], tuple([step[: STEPS[step[0]] + 1] for step in named])))
+        used = tuple([step[: STEPS[step[0]] + 1] for step in named])
+        result.append(Paint(graded or elements[at], used, tuple(tilts[row])))
         first += count
     if first != len(rows):
         raise TensorError("steps that no paint has")
@@ -105,7 +116,7 @@ def read_paints(tensors: dict[str, npt.NDArray[Any]], elements: tuple[Element, .
 def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimension: int) -> str | None:
     """Say what is wrong with the paints of a Program of a dimension, None where nothing is."""
     known = set(elements)
-    for element, steps in paints:
+    for element, steps, tilt in paints:
         if isinstance(element, Gradient):
             fault = stops_fault([stop[0] for stop in element.stops])
             if fault is not None or not all(0.0 <= v <= 1.0 for stop in element.stops for v in stop):
@@ -114,6 +125,8 @@ def paint_fault(paints: Iterable[Paint], elements: tuple[Element, ...], dimensio
             return f"a paint of `{element.name}`, which is not a material that is listed"
         if element.dimension > dimension:
             return f"a paint of dimension {element.dimension} in the plane"
+        if not np.isfinite(tilt).all() or (any(tilt) and (dimension, element.dimension) != (3, 2)):
+            return f"a tilt of a paint of `{element.name}` where there is none"
         numbers = [number for step in steps for number in step[1:]]
         if any(STEPS.get(step[0]) != len(step) - 1 for step in steps) or not np.isfinite(numbers).all():
             return f"a step of a paint of `{element.name}` that is not known"
@@ -230,7 +243,10 @@ class Program:
         if self.elements:
             settings = (*settings, *[element and element.digest for element in self.brought()])
         if self.palette:
-            worn = [paint and (paint.element.digest, paint.steps) for paint in self.paints()]
+            worn = [
+                paint and (paint.element.digest, paint.steps, *([paint.tilt] if any(paint.tilt) else []))
+                for paint in self.paints()
+            ]
             settings = (*settings, *worn)
         if self.samples != 4:
             settings = (*settings, "samples", self.samples)
@@ -328,6 +344,8 @@ def program_bytes(program: Program) -> bytes:
         table = [(at, BY_POINTS.index(e.form), *e.sizes) for at, e in outlines]
         tensors["outlines"] = np.array(table, np.int32)
         tensors["points"] = np.frombuffer(b"".join(e.data for _, e in outlines), "<f8").reshape(-1, 2)
+    elif "tilts" in tensors:
+        header["format"] = NEWEST
     elif program.newer:
         header["format"] = NEWER
     elif program.extended:
@@ -415,13 +433,14 @@ def _light_fault(program: Program) -> str | None:
 
 _MOST_STEPS = 10 * MOST_OBJECTS  # of all paints
 MOST_PROGRAM_BYTES = MOST_HEADER + 8 + MOST_ELEMENT_BYTES + 16 * _MOST_STEPS
-MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8 + 12) + 16 * _MOST_STEPS
+MOST_PROGRAM_BYTES += MOST_OBJECTS * (4 * WIDTH + 1 + 16 + 4 + 20 + 4 + 4 + 4 + 8 + 12 + 8) + 16 * _MOST_STEPS
 
 _Columns = dict[str, tuple[str, tuple[int, ...]]]  # kinds of numbers, and the sides of each row
 _LAYOUT: _Columns = {"vectors": ("F32", (WIDTH,)), "tokens": ("I8", ()), "bounds": ("F32", (4,))}
 _LAYOUT |= {"objects": ("I32", ()), "places": ("I32", (5,))}
 _OPTIONAL = dict.fromkeys(("numbers", "forms", "worn"), _LAYOUT["objects"])
 _TABLES: _Columns = {"paints": ("I32", (2,)), "steps": ("F32", (4,)), "stops": ("F32", (5,))}
+_TABLES |= {"tilts": ("F32", (2,))}
 _PAINTS = {"paints", "steps"}
 _OUTLINES: _Columns = {"outlines": ("I32", (3,)), "points": ("F64", (2,))}
 _HEADER: dict[Any, Any] = dict.fromkeys(("format", "samples?"), int) | dict.fromkeys(
@@ -548,7 +567,9 @@ def _count(file: TensorFile) -> int:
             newer |= _PAINTS
         if format > 4 and "worn" in newer:
             newer |= {"stops"} & file.tensors.keys()
-    newer |= set(_OUTLINES) if format == NEWEST else set()
+    if format == NEWEST:  # with outlines, tilts or both
+        newer |= {"tilts"} & file.tensors.keys() if "worn" in newer else set()
+        newer |= set(_OUTLINES) if "outlines" in file.tensors or "tilts" not in newer else set()
     if not _LAYOUT.keys() | newer <= file.tensors.keys() <= _LAYOUT.keys() | newer | {"numbers"}:
         raise TensorError(f"it holds other tensors than a program of format {format}")
     count = (*file.tensors["vectors"].shape, 0)[0]
@@ -558,7 +579,7 @@ def _count(file: TensorFile) -> int:
         kind, rest = (_LAYOUT | _OPTIONAL | _TABLES | _OUTLINES)[name]
         rows = count
         if name in _TABLES | _OUTLINES:
-            most = MOST_OBJECTS if name in ("paints", "outlines") else _MOST_STEPS
+            most = MOST_OBJECTS if name in ("paints", "outlines", "tilts") else _MOST_STEPS
             rows = min((*tensor.shape, 0)[0], most)
         if tensor.type != kind or tensor.shape != (rows, *rest):
             raise TensorError(f"tensor `{name}` is {tensor.type} {list(tensor.shape)}")

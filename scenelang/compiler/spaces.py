@@ -558,6 +558,20 @@ class Plane(Space):
         return self.box(geometry, steps, level)[:4]
 
 
+class Sheet(Space):
+    """Maps of space by what is left of a point that they carry back: x and y, as textures have them."""
+
+    def stretches(self, rows: Rows) -> tuple[float, float]:
+        try:
+            a, b, c, _, d, e, f, *_ = inverted(rows)
+        except ZeroDivisionError:
+            return 0.0, 1.0
+        p, q, r = a * a + b * b + c * c, a * d + b * e + c * f, d * d + e * e + f * f
+        largest = sqrt((p + r) / 2.0 + hypot((p - r) / 2.0, q))
+        area = hypot(a * e - b * d, b * f - c * e, c * d - a * f)
+        return (1.0 / largest, largest / area) if largest and area else (0.0, 1.0)
+
+
 def flattened(rows: Rows) -> Rows:
     """The same map of the plane with z left alone."""
     return (rows[0], rows[1], 0.0, rows[3], rows[4], rows[5], 0.0, rows[7], 0.0, 0.0, 1.0, 0.0)
@@ -664,4 +678,5 @@ def _warped(steps: Sequence[Step], radius: float) -> tuple[float, float, float, 
 
 
 PLANE: Final = Plane()
+SHEET: Final = Sheet()
 SPACES: Final[dict[int, Space]] = {2: PLANE, 3: Space()}

@@ -67,7 +67,7 @@ OBJECT = dtype_of(
 STEP = dtype_of("i4 kind", "f4 twirl rate map[12]")
 DECODER = dtype_of("i4 kind units size[8] inner features feature[7] width", "f4 radius line[27,8]", "u8 data")
 CELL = dtype_of("f4 own[5] past[5] bias[5] candidate bump", "i4 smooth")
-TEXTURE = dtype_of("i4 kind wide high stops steps", "f4 place[6]", "u8 data step")
+TEXTURE = dtype_of("i4 kind wide high stops steps", "f4 place[8]", "u8 data step")
 PIECE = dtype_of("i4 ray", "f4 begin end before sigma")
 SCENE = dtype_of(
     "i4 objects groups deepest rows switched clipping media mixed hues dense coloured",
@@ -440,7 +440,8 @@ class Held:
 
 def texture_row(tables: Held, row: Rows, paint: Paint, texture: Any, xp: Any) -> None:
     """Fill a row of a paint's texture, whose arrays tables keep."""
-    row["place"] = np.array(texture.place.rows).reshape(-1)
+    rows = np.array(texture.place.rows)
+    row["place"] = (rows if rows.shape[1] == 4 else np.insert(rows, 2, 0.0, 1)).reshape(-1)
     if isinstance(paint.element, Gradient):
         stops = paint.element.stops
         row["kind"] = RADIAL if paint.element.name == "radial" else LINEAR

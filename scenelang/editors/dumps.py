@@ -108,7 +108,7 @@ def look_text(look: Look, space: Space) -> str:
     own = [f" {name}({' '.join(f'{v:.6g}' for v in numbers)})" for name, *numbers in _properties(look)]
     if look.element is None:
         return "".join([hex_text(space.written(look.colour())), *own])
-    moves = [move_text(Move(step), PLANE) for step in look.texture]
+    moves = [move_text(Move(step), space if look.tilted else PLANE) for step in look.texture]
     steps = [f"{kind}({' '.join(f'{v:.6g}' for v in numbers)})" for kind, *numbers in look.colours]
     return "".join([" ".join([look.element.name, *moves, *steps]), *own])
 
@@ -203,7 +203,7 @@ def _node(node: Node) -> dict[str, Any]:
         look["rgb"] = list(node.look.colour())
         look |= {n: numbers if len(numbers) > 1 else numbers[0] for n, *numbers in _properties(node.look)}
         if (element := node.look.element) is not None:
-            rows = [_move(Move(step))["affine"][:2] for step in node.look.texture]
+            rows = [_move(Move(step))["affine"][: 3 if node.look.tilted else 2] for step in node.look.texture]
             look["texture"] = {**_texture(element), "steps": list(node.look.colours), "moves": rows}
         return {"kind": "leaf", **look, "moves": moves}
     links = [{"op": one.op, **({"k": one.k} if one.k else {}), "node": _node(one.node)} for one in node.links]
@@ -233,6 +233,7 @@ def program_data(program: Program) -> dict[str, Any]:
     for row, paint in zip(rows, program.paints(), strict=True):
         if paint is not None:
             row["texture"] = {**_texture(paint.element), "steps": list(paint.steps)}
+            row["texture"] |= {"tilt": paint.tilt} if any(paint.tilt) else {}
     return {
         "canvas": list(program.canvas),
         "background": None if program.background is None else list(program.background),

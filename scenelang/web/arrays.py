@@ -202,11 +202,12 @@ def rows_of(program: Program, manifest: Manifest, codes: np.ndarray, material_co
             if parts.glow[i].any():
                 row["glow"] = parts.glow[i].tolist()
         if worn >= 0:
-            element, steps = program.palette[worn]
+            element, steps, tilt = program.palette[worn]
             if isinstance(element, Gradient):
                 row["stops"], element = element.stops, Gradient(element.name)
             row |= {"paint": paints.index(element), "paintSteps": steps}
             row["place"] = parts.texture[i].tolist()
+            row |= {"tilt": tilt} if any(tilt) else {}
         rows.append(row)
     return rows
 

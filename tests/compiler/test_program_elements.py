@@ -128,6 +128,38 @@ def test_damaged_paints() -> None:
     ])  # fmt: skip
 
 
+def solid(*palette: Paint, **fields: Any) -> Program:
+    plain = compile_scene(nsg.Scene(nodes=[nsg.Object("sphere"), nsg.Object("torus")]))
+    given = {"elements": (BARK, STONE), "worn": np.array([0, 1], np.int32), **fields}
+    return replace(plain, palette=palette, **given)
+
+
+TILTED = solid(Paint(STONE, STEPS, (0.5, -1.0)), Paint(BARK))
+
+
+def test_tilts_come_back() -> None:
+    found = parse_program(program_bytes(TILTED))
+    assert found.paints() == TILTED.paints() == [Paint(STONE, STEPS, (0.5, -1.0)), Paint(BARK)]
+    assert program_bytes(found) == program_bytes(TILTED)
+    flat = solid(Paint(STONE, STEPS), Paint(BARK))
+    others = TILTED, flat, solid(Paint(STONE, STEPS, (0.5, 1.0)), Paint(BARK))
+    assert len({one.digest() for one in others}) == 3
+    assert b"tilts" not in program_bytes(flat)
+
+
+def test_damaged_tilts() -> None:
+    refused(program_bytes(TILTED), [
+        (lambda h, t: h.update(format=5), "other tensors than a program of format 5"),
+        (lambda h, t: t.pop("tilts"), "other tensors than a program of format 6"),
+        (lambda h, t: t.update(tilts=t["tilts"][:1]), "tilts of other paints"),
+        (lambda h, t: t.update(tilts=np.ones((2, 3), np.float32)), "tensor `tilts` is F32"),
+        (lambda h, t: t.update(tilts=t["tilts"].astype(np.float64)), "tensor `tilts` is F64"),
+        (lambda h, t: t.update(tilts=np.full((2, 2), np.nan, np.float32)), "not finite"),
+    ])  # fmt: skip
+    with pytest.raises(ProgramError, match="a tilt of a paint of `stone`"):
+        painted(Paint(STONE, (), (0.0, 1.0)), worn=[0, -1])
+
+
 SUNSET = Gradient("radial", ((0.0, 1.0, 0.5, 0.0), (0.5, 0.0, 0.0, 0.25), (0.5, 1.0, 1.0, 1.0)))
 GRADED = painted(Paint(SUNSET, STEPS), Paint(Gradient("linear", SUNSET.stops[:2])), worn=[1, 0], elements=())
 

@@ -15,7 +15,7 @@ from scenelang.assets.element_file import ElementFile
 from scenelang.compiler.compile import compile_scene
 from scenelang.compiler.graph import Graph
 from scenelang.compiler.lifting import LAYOUTS
-from scenelang.compiler.program import Program, parse_program, program_bytes
+from scenelang.compiler.program import Paint, Program, parse_program, program_bytes
 from scenelang.drawing.exact.picture import reference_image
 from scenelang.language.diagnostics import Diagnostics
 from tests.assets.shapes import noise
@@ -73,6 +73,68 @@ def test_a_point_goes_back_through_the_moves_last_to_first(moves: list[Any], geo
         assert found == pytest.approx(expected, rel=1e-5, abs=1e-4 * max(1.0, float(abs(frame).max())))
 
 
+_axis = st.tuples(_number, _number, _factor)
+_solid_move = st.one_of(
+    st.tuples(_number, _number, _number).map(lambda by: nsg.Translate(*by)),
+    st.tuples(_number, _axis).map(lambda by: nsg.Rotate(angle=by[0], axis=by[1])),
+    st.tuples(_factor, _factor, _factor).map(lambda by: nsg.Scale(*by)),
+    st.tuples(st.sampled_from(["xz", "yz", "zx", "zy"]), _number).map(lambda given: nsg.Shear(*given)),
+    _move,
+)
+QUARTER = nsg.Rotate(angle=math.pi / 2, axis=(1, 0, 0))
+
+
+def back_in_space(move: Any, p: np.ndarray) -> np.ndarray:
+    """The point that a move brings to p, as the language defines each of them for geometry."""
+    match move.kind:
+        case "translate":
+            return p - (move.x, move.y, move.z)
+        case "rotate":
+            axis = np.array(move.axis) / np.linalg.norm(move.axis)
+            c, s = math.cos(-move.angle), math.sin(-move.angle)
+            return np.asarray(c * p + s * np.cross(axis, p) + (1 - c) * (axis @ p) * axis)
+        case "scale":
+            return p / (move.x, move.y, move.z)
+        case "shear":
+            i, j = map("xyz".index, move.axes)
+            return p - move.k * p[j] * np.eye(3)[i]
+        case _:
+            return p * (-1, 1, 1)
+
+
+@settings(deadline=None)
+@given(st.lists(_solid_move, max_size=7))
+def test_points_of_solids_go_back_through_moves_of_space(moves: list[Any]) -> None:
+    program = compiled(nsg.Material("zoo.bark", moves), geometry="torus")
+    (paint,) = program.palette
+    frame = np.insert(frame_of(program), 2, paint.tilt, 1)
+    for p in ((0.0, 0.0, 0.0), (0.7, -0.2, 0.3), (-0.4, 0.9, -0.8)):
+        expected = np.array(p)
+        for move in reversed(moves):
+            expected = back_in_space(move, expected)
+        near = 1e-4 * max(1.0, float(abs(frame).max()))
+        assert frame @ [*p, 1] == pytest.approx(expected[:2], rel=1e-5, abs=near)
+    assert parse_program(program_bytes(program)).digest() == program.digest()
+
+
+def test_what_happens_along_z_alone_leaves_programs_as_they_were() -> None:
+    alone = nsg.Scale(2, 2), nsg.Rotate(angle=0.3)
+    along = (
+        nsg.Scale(2),
+        nsg.Translate(0, 0, 3),
+        nsg.Rotate(angle=0.3),
+        nsg.Shear("zx", 2),
+        nsg.Scale(1, 1, 1e-20),
+    )
+    flat, more = (compiled(nsg.Material("zoo.bark", moves), geometry="torus") for moves in (alone, along))
+    assert program_bytes(flat) == program_bytes(more)
+    assert b"tilts" not in program_bytes(flat)
+    assert b'\\"format\\":3' in program_bytes(flat)
+    tilted = compiled(nsg.Material("zoo.bark", (*alone, QUARTER)), geometry="torus")
+    assert b'\\"format\\":6' in program_bytes(tilted)
+    assert tilted.palette[0].tilt == pytest.approx((math.sin(0.3) / 2, math.cos(0.3) / 2))
+
+
 def test_colour_steps_are_as_written_and_linear_in_space() -> None:
     ops = (
         nsg.Color((0.5, 0.25, 1)),
@@ -82,7 +144,7 @@ def test_colour_steps_are_as_written_and_linear_in_space() -> None:
         nsg.Grayscale(0.25),
     )
     (flat,) = compiled(nsg.Material("zoo.bark", ops)).palette
-    assert flat == (BARK, (("color", 0.25, 0.25, 1.0), ("hue", 0.25), ("grayscale", 0.25)))
+    assert flat == Paint(BARK, (("color", 0.25, 0.25, 1.0), ("hue", 0.25), ("grayscale", 0.25)))
     (solid,) = compiled(nsg.Material("zoo.bark", ops), geometry="torus").palette
     half, quarter = (((v + 0.055) / 1.055) ** 2.4 for v in (0.5, 0.25))
     assert solid.steps[0][1:] == pytest.approx((half * half, quarter, 1.0))
@@ -133,7 +195,11 @@ def test_refusals() -> None:
         ("torus", "E0504", "`flip` moves a texture, and `zoo.hide` is a", "zoo.hide", nsg.Flip()),
         ("square", "E0312", "`scale` is singular in float32", "zoo.bark", nsg.Scale(1e-31)),
         ("square", "E0406", "compose to a singular one", "zoo.bark", (nsg.Scale(1e-20),) * 2),
-        ("torus", "E0505", "leaves the plane", "zoo.bark", nsg.Translate(0, 0, 1)),
+        ("square", "E0505", "leaves the plane", "zoo.bark", nsg.Translate(0, 0, 1)),
+        ("square", "E0505", "leaves the plane", "zoo.bark", nsg.Rotate(angle=1, axis=(1, 0, 0))),
+        ("square", "E0505", "leaves the plane", "zoo.bark", nsg.Shear("yz", 1)),
+        ("torus", "E0312", "`scale` is singular", "zoo.bark", nsg.Scale(1, 1e-13)),
+        ("torus", "E0406", "compose to a singular one", "zoo.bark", (nsg.Scale(1, 1e-7, 1e-7), QUARTER) * 2),
         ("square", "E0320", "more than 1,000 operations", "zoo.bark", hues),
     ):
         model, found = "shapes2d" if geometry == "square" else "solids3d", Diagnostics()
@@ -166,11 +232,12 @@ def test_textures_that_are_drawn_small(
 
 @pytest.mark.parametrize("geometries", [("square", "star"), ("sphere", "torus")])
 def test_passes_keep_the_exact_picture(geometries: tuple[str, str]) -> None:
+    out = (0.2, 0.1) if geometries[0] == "sphere" else (0.0, 0.0)
     moves = (
-        nsg.Rotate(angle=0.4),
+        nsg.Rotate(angle=0.4, axis=(*out, 1)),
         nsg.Scale(0.7, -0.4),
         nsg.Shear("yx", 0.5),
-        nsg.Translate(0.3, 0.1),
+        nsg.Translate(0.3, 0.1, out[0]),
         nsg.Flip(),
     )
     colours = nsg.Hue.degrees(50), nsg.Hue.degrees(90), nsg.Color((1, 0.5, 0.8)), nsg.Color((0.5, 1, 0.9))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+import re
 from typing import Any
 
 import numpy as np
@@ -20,6 +21,7 @@ HARD: Stops = (
     (0.83, (1.0, 1.0, 0.2)),
 )
 SOFT: Stops = ((0.0, (0.9, 0.1, 0.1)), (1.0, (0.1, 0.1, 0.9)))
+HALF = 3**-0.5  # of a box's side
 BACKENDS: tuple[dict[str, str], ...] = ({}, {"device": "cpu"}, {"backend": "exact"}, {"backend": "reference"})
 
 
@@ -86,6 +88,54 @@ def test_pixels_on_a_sphere(how: Any, name: str) -> None:
     assert len(found) > 60
     assert psnr_db(found, encoded(expected)[hits == 4]) > 50
     assert np.median(abs(found - encoded(expected)[hits == 4])) < 1e-3
+
+
+@pytest.mark.parametrize("how", BACKENDS)
+def test_a_floor_has_a_checker_by_the_worlds_x_and_z(how: Any) -> None:
+    """A box seen from above, where up is -z; its squares are half a unit of (u, v)."""
+    side, dark, light = 24, (0.165, 0.498, 0.486), (0.957, 0.925, 0.847)
+    text = f"""
+        camera(eye = [0, 6, 0]); light(power = 0); ground(none); canvas({side}, {side});
+        let top = HALF;
+        box {{ scale(2, 1, 1.6); translate(0, -top, 0);
+          material checker {{
+            scale(0.3, 0.6, 9); translate(0, 0.15); rotate(90deg, axis = X); scale(1, 7, 1 / 1.6);
+          }}
+        }}
+    """
+    expected, alike = np.zeros((side, side, 3)), np.ones((side, side), bool)
+    for i, j, x, y in samples(side):
+        x, z = 2 * x, -2 * y  # at the box's top, which is as far from the eye as the target
+        u, v = x / 0.3, z / 0.3 - 0.5  # carried back, in squares
+        shown = dark if (math.floor(u) + math.floor(v)) % 2 else light
+        alike[i, j] &= max(abs(x) / 2, abs(z) / 1.6) < 0.95 * HALF
+        alike[i, j] &= min(abs(u - round(u)), abs(v - round(v))) > 0.05
+        expected[i, j] += decoded(np.array(shown)) * 0.18 / 4
+    found = np.asarray(nsg.render(nsg.loads(text.replace("HALF", str(HALF))), **how))[alike]
+    assert len(found) > 60
+    np.testing.assert_allclose(found, encoded(expected)[alike], atol=4e-3)
+
+
+BRICKS = "material bricks { scale(0.6); rotate(90deg, axis = X); }"
+CHECKS = "material checker { rotate(70deg, axis = [1, 0.2, 0.1]); shear(xz = 0.3); }"
+RINGS = written("radial", HARD, "translate(0, 0, 0.3); rotate(60deg, axis = Y);")
+MIST = written("linear", HARD, "rotate(70deg, axis = Y);")
+TILTED = {
+    "floor": f"box {{ scale(2, 0.1, 2); translate(0, -0.8, 0); {BRICKS} }}",
+    "top": f"cylinder {{ scale(0.8, 0.6, 0.8); {CHECKS} }}",
+    "gradient": f"torus {{ rotate(40deg, axis = X); material {RINGS} }}",
+    "mist": f"sphere {{ material volumetric {MIST} }}",
+}
+
+
+@pytest.mark.parametrize("name", TILTED)
+@pytest.mark.parametrize("how", BACKENDS[:2])
+def test_textures_of_space_are_those_of_the_reference(how: Any, name: str) -> None:
+    begin, (leaf, looks) = "canvas(48, 48); camera(eye = [1, 3, 5]);", TILTED[name].split("material")
+    turned, still = (f"{begin} {leaf} material {re.sub(what, '', looks)}" for what in ("-", "rotate[^;]*;"))
+    exact = np.asarray(nsg.render(nsg.loads(turned), backend="reference"))
+    assert psnr_db(np.asarray(nsg.render(nsg.loads(turned), **how)), exact) > 40
+    assert psnr_db(np.asarray(nsg.render(nsg.loads(still), backend="reference")), exact) < 35
 
 
 def test_mist_is_that_of_the_reference() -> None:

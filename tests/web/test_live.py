@@ -108,7 +108,7 @@ def check_picture(picture: dict[str, Any], expected: Compiled, form: PageProgram
         mine, theirs = [*manifest.geometries, *form.shapes], [*manifest.geometries, *shapes]
         assert mine[row["shape"]] == theirs[own["shape"]]
         assert [*form.paints, None][row["paint"]] == [*paints, None][own["paint"]]
-        for name in ("glow", "density"):
+        for name in ("glow", "density", "tilt"):
             np.testing.assert_allclose(row.get(name) or 0, own.get(name, 0), rtol=1e-5)
         np.testing.assert_allclose(row.get("stops") or [], own.get("stops", []), atol=1e-6)
         inks, own_inks = row.get("paintSteps") or [], own.get("paintSteps", [])
@@ -274,6 +274,9 @@ MISTAKES = [
     ("star { material flat { opacity(n); } }", 2, "opacity of 2 is outside"),
     ("sphere { material volumetric { density(5e5 * n); } }", 3, "density of 1500000"),
     ("sphere { material diffuse { glow(#f00, 1 - n); } }", 2, "power of -1"),
+    ("square { material checker { rotate(30deg, axis = [0, n - 1, 1]); } }", 2, "leaves its plane"),
+    ("square { material checker { translate(0, 0, n - 1); } }", 2, "leaves its plane"),
+    ("sphere { material checker { scale(1, 10 ^ (1 - n)); } }", 14, "texture is singular"),
     ("light(n > 1 ? none : [1, 2, 3]); light(); sphere;", 2, "beside another light"),
     ("star { material flat { opacity(0.5); if (n > 1) { opacity(0.6); } } }", 2, "given twice"),
     ("samples(n > 1 ? 9 : 16); star;", 2, "9 samples"),
@@ -407,6 +410,20 @@ def test_polygons_and_splines(viewer_page: Any) -> None:
     [[same, other]] = pictures(viewer_page, [(moving[0], [{}, {"params": {"n": 0.5}}])])
     assert len(same["rows"]) == 1
     assert "points" in other
+
+
+TILTED = """param a = 90deg in 0deg..180deg; param n = 1 in 0..2;
+box { material checker { scale(n, 2, 3); rotate(a, axis = X); translate(0, n, n); scale(0.5); } }
+sphere { translate(2, 0, 0); material volumetric radial { stop(0, #f00); stop(n / 2, #0f0);
+  scale(1, 1, 1e-20); rotate(a, axis = [1, n, 0]); shear(yz = n); } }
+torus { translate(-2, 0, 0); material bricks { scale(2); translate(0, 0, n); rotate(a); } }"""
+
+
+def test_textures_of_space(viewer_page: Any) -> None:
+    """Params turn them out of x and y and back."""
+    cases: list[Any] = [({"a": a, "n": n}, 0) for a in (0.0, 1.0, math.pi) for n in (0.6, 1, 2)]
+    assert check_cases(viewer_page, SourceFile("scene.nsg", TILTED), cases) == len(cases)
+    assert check_cases(viewer_page, SourceFile("scene.nsg", TILTED), [({}, 0), ({"n": 0.0}, 0)]) == 1
 
 
 MODEL = load_manifest("shapes2d")

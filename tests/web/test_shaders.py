@@ -521,6 +521,21 @@ def test_corners_are_the_networks(page: Any, tmp_path: Path, name: str) -> None:
 
 
 @pytest.mark.browser
+def test_textures_of_space_are_the_networks(page: Any) -> None:
+    program = nsg.compile(nsg.loads(TILTED))
+    assert all(any(paint.tilt) for paint in program.palette)
+    check_points(page, program)
+    assert compared(page, program) > LEAST_DB[3]
+
+
+TILTED = """canvas(96, 64); camera(eye = [1, 3, 5]);
+box { scale(3, 0.1, 3); translate(0, -1, 0); material bricks { scale(0.4); rotate(90deg, axis = X); } }
+cylinder { scale(0.7); translate(-1, 0, 0); material checker { scale(2); rotate(2rad, axis = X); } }
+torus { scale(0.5); translate(0.9, 0, 0.3); material linear {
+  stop(0, #f40); stop(1, #04f); translate(0, 0, 0.2); rotate(60deg, axis = Y); } }"""
+
+
+@pytest.mark.browser
 def test_solid_trees_are_the_networks(page: Any) -> None:
     """Groups in groups and rounded cuts, of solids and of media."""
     for seed in (0, 2, 6, 8):

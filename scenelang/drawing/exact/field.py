@@ -240,7 +240,7 @@ def evaluate(
         if owners:
             c = np.asarray((node.number, look.opacity, look.opacity), np.float64)
         elif look.element is not None:
-            c = colour_at(look, carry_back(look.texture, q[: look.element.dimension]))
+            c = colour_at(look, carry_back(look.texture, q)[: look.element.dimension])
         else:
             c = np.asarray(look.colour(), np.float64)
         if clear:

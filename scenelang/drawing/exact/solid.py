@@ -190,7 +190,7 @@ class ExactBody:
             return self.rgb
         for step in (self.first, *self.back):
             p = step(p)
-        own = carry_back(self.look.texture, p[: self.look.element.dimension])
+        own = carry_back(self.look.texture, p)[: self.look.element.dimension]
         return colour_at(self.look, own, light=True).T
 
     def gradient(self, p: Array) -> Array:

@@ -170,8 +170,8 @@ MOST = 1e20  # of a frame's numbers: points times these stay in float32
 
 
 class Texture:
-    """Colours of a paint at leaf coordinates, linear if ``light``; ``frame`` leads from x and y to the
-    picture (6,). Raises `ProgramError` for a damaged element or a frame beyond float32.
+    """Colours of a paint at leaf coordinates, linear if ``light``; ``frame`` (6,) leads from x and y to the
+    picture. Raises `ProgramError` for a damaged element or a frame beyond float32.
     """
 
     texels: Any = None
@@ -183,8 +183,9 @@ class Texture:
         flat = xp.array(values.reshape(3, -1), like)
         self.lattice = Lattice(xp, flat, len(values[0]), 3) if values.ndim == 4 else None
         # from leaf coordinates to shares of the picture's sides, from its upper left corner
-        (a, b, u), (c, d, v) = _rows(frame)
-        self.place = FrameMap(((a / 2, b / 2, (u + 1) / 2 % 1.0), (-c / 2, -d / 2, (1 - v) / 2 % 1.0)))
+        (*a, u), (*b, v) = _rows(frame, paint)
+        right, down = [n / 2 for n in a], [-n / 2 for n in b]
+        self.place = FrameMap(((*right, (u + 1) / 2 % 1.0), (*down, (1 - v) / 2 % 1.0)))
         self.texels, self.sides = flat, values.shape[-2:]
         across = _across(self.place) if values.ndim == 3 else 0.5
         self.detail = across * max(values.shape)  # Texels that a way of a leaf unit may cross, about
@@ -196,10 +197,13 @@ class Texture:
     def _colours(self, q: Array) -> Array:
         return self._picture(q) if self.lattice is None else self.lattice.at(q.clip(-1.0, 1.0))
 
+    def _spot(self, q: Array) -> Any:
+        return self.place(self._xp, [*q[: len(self.place.rows[0]) - 1]])
+
     def _picture(self, q: Array) -> Array:
         xp, (high, wide) = self._xp, self.sides
         cells, shares = [], []
-        for share, count in zip(self.place(xp, [q[0], q[1]]), (wide - 2, high - 2), strict=True):
+        for share, count in zip(self._spot(q), (wide - 2, high - 2), strict=True):
             place = (share - xp.floor(share)) * count + 0.5  # among the texels and the one before the first
             cells.append(xp.whole(place))
             shares.append(place - xp.narrow(cells[-1]))
@@ -209,16 +213,14 @@ class Texture:
 class _Graded(Texture):
     """The same of a gradient, whose stops are in the space that colours are averaged in."""
 
-    def __init__(
-        self, xp: Arrays, gradient: Gradient, steps: tuple[ColourStep, ...], frame: np.ndarray
-    ) -> None:
-        self._xp, self.steps, self.gradient = xp, steps, gradient
-        self.place = FrameMap(_rows(frame))
+    def __init__(self, xp: Arrays, paint: Paint, gradient: Gradient, frame: np.ndarray) -> None:
+        self._xp, self.steps, self.gradient = xp, paint.steps, gradient
+        self.place = FrameMap(_rows(frame, paint))
         self.detail = EDGE if gradient.edges else min(_across(self.place) * gradient.slope, EDGE)
 
     def _colours(self, q: Array) -> Array:
         xp, stops = self._xp, self.gradient.stops
-        u, v = self.place(xp, [q[0], q[1]])
+        u, v = self._spot(q)
         s = (u + 1.0) * 0.5 if self.gradient.name == "linear" else xp.length([u, v])
         rows = [xp.full((len(s),), value, s) for value in stops[0][1:]]
         for (begin, *a), (end, *b) in pairwise(stops):
@@ -231,20 +233,23 @@ class _Graded(Texture):
 def texture_of(xp: Arrays, paint: Paint, frame: np.ndarray, like: Array, light: bool) -> Texture:
     """The texture of a paint, which may be a gradient; as `Texture`."""
     if isinstance(paint.element, Gradient):
-        return _Graded(xp, paint.element, paint.steps, frame)
+        return _Graded(xp, paint, paint.element, frame)
     return Texture(xp, paint, frame, like, light)
 
 
-def _rows(frame: np.ndarray) -> Any:
-    """Rows of a texture's frame (6,); raises ProgramError where they are beyond float32."""
-    if not abs(frame).max() < MOST:
+def _rows(frame: np.ndarray, paint: Paint) -> Any:
+    """Rows (2, 3) of a texture's frame, or (2, 4) where it tilts; raises ProgramError for what is beyond
+    float32.
+    """
+    if not max(abs(frame).max(), *map(abs, paint.tilt)) < MOST:
         raise ProgramError("a texture's frame beyond float32")
-    return frame.astype(np.float64).reshape(2, 3).tolist()
+    rows = frame.astype(np.float64).reshape(2, 3)
+    return (np.insert(rows, 2, paint.tilt, 1) if any(paint.tilt) else rows).tolist()
 
 
 def _across(place: FrameMap) -> float:
     """The most that a coordinate changes over a leaf unit, about."""
-    return float(abs(np.array([row[:2] for row in place.rows])).max())
+    return float(abs(np.array([row[:-1] for row in place.rows])).max())
 
 
 @lru_cache(maxsize=32)

@@ -152,6 +152,7 @@ function rowData({ token, leaf, k }, { dimension }) {
     density: look.density,
     paint: look.paint,
     place: look.place,
+    tilt: look.tilt,
     paintSteps: look.paintSteps,
     stops: look.stops,
     amount: bump?.amount ?? 0,

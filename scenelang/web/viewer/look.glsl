@@ -45,12 +45,14 @@ vec3 graded(vec2 spot, int row, int count, bool straight) {
 vec3 textured(int row, vec4 paint, vec3 q) {
   vec4 u = part(row, PLACE), v = part(row, PLACE + 1), size = part(row, GRID);
   vec3 rgb;
+  vec2 spot = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
+#ifdef TILTS
+  spot += q.z * part(row, TILT).xy;
+#endif
   if (paint.x > 2.5) {
-    vec2 spot = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
     rgb = graded(spot, int(paint.y), int(v.w), paint.x < 3.5);
   } else if (paint.x < 1.5) {
-    vec2 sides = size.zw, place = vec2(dot(u.xyz, vec3(q.xy, 1.0)), dot(v.xyz, vec3(q.xy, 1.0)));
-    place = fract(place) * sides - 0.5;
+    vec2 sides = size.zw, place = fract(spot) * sides - 0.5;
     vec2 cell = floor(place), share = place - cell;
     ivec2 a = ivec2(mod(cell, sides)), b = ivec2(mod(cell + 1.0, sides)), top = ivec2(0, int(u.w));
     rgb = mix(mix(texel(a + top), texel(ivec2(b.x, a.y) + top), share.x),

@@ -62,6 +62,7 @@ function fewerInks(steps) {
  */
 export function lookOf(worn, form) {
   let moved = IDENTITY;
+  const sides = form.dimension === 3 ? "sheet" : 2;
   const steps = [], stops = [];
   let opacity = 1, glow, density;
   for (const op of worn.ops) {
@@ -88,20 +89,21 @@ export function lookOf(worn, form) {
       continue;
     }
     if (worn.paint >= 0 && form.spatial[worn.paint]) refuse("colours of space do not move");
-    const rows = flatMap(op.rows);
+    const rows = form.dimension === 3 ? op.rows : flatMap(op.rows);
     if (rows === null && worn.paint >= 0) refuse("a move of a texture leaves its plane");
-    if (rows !== null && !usableMap(rows, 2)) refuse("a move of a texture is singular");
+    if (rows !== null && !usableMap(rows, sides)) refuse("a move of a texture is singular");
     if (rows !== null) moved = composedMap(rows, moved);
   }
-  if (!usableMap(moved, 2)) refuse("the moves of a texture compose to a singular one");
+  if (!usableMap(moved, sides)) refuse("the moves of a texture compose to a singular one");
   checkStops(stops, worn.paint >= 0 && form.graded[worn.paint]);
   if (opacity !== 1 && form.dimension === 3) refuse("in space nothing but mist is translucent");
   const look = { material: worn.lit, paint: worn.paint, colour: [1, 1, 1], opacity, glow, density };
   if (worn.paint < 0) return { ...look, colour: steps.reduce(inkedColour, [1, 1, 1]) };
   const paintSteps = fewerInks(steps);
   if (paintSteps.length > MOST_OPERATIONS) refuse("too many operations on the colours of a texture");
-  const [a, b, , x, c, d, , y] = invertedMap(moved);
-  return { ...look, place: [a, b, x, c, d, y], paintSteps, stops: stops.length ? stops : undefined };
+  const [a, b, p, x, c, d, q, y] = invertedMap(moved);
+  const tilt = moved[2] || moved[6] ? [p, q] : undefined;
+  return { ...look, place: [a, b, x, c, d, y], tilt, paintSteps, stops: stops.length ? stops : undefined };
 }
 
 function checkStops(stops, graded) {

@@ -71,8 +71,18 @@ function solidStretches([a, b, c, , d, e, f, , g, h, i]) {
   return [Math.min(area > 0 ? det / area : 0, values[1]), values[2]];
 }
 
-/** The smallest and largest singular value of a map's linear part, in a dimension. */
+/** The same by what is left of points that a map carries back: x and y. */
+function sheetStretches(rows) {
+  const [a, b, c, , d, e, f] = invertedMap(rows);
+  const p = a * a + b * b + c * c, q = a * d + b * e + c * f, r = d * d + e * e + f * f;
+  const largest = Math.sqrt((p + r) / 2 + Math.hypot((p - r) / 2, q));
+  const area = Math.hypot(a * e - b * d, b * f - c * e, c * d - a * f);
+  return largest > 0 && area > 0 ? [1 / largest, largest / area] : [0, 1];
+}
+
+/** The smallest and largest singular value of a map's linear part, in a dimension or a "sheet" of space. */
 export function stretchesOf(rows, dimension) {
+  if (dimension === "sheet") return sheetStretches(rows);
   return dimension === 2 ? flatStretches(rows) : solidStretches(rows);
 }
 

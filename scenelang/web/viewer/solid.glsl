@@ -14,12 +14,12 @@ vec4 swish(vec4 x) { // of a number and its gradient
 //network//
 
 // The field of solids. Of what a scene lacks nothing is compiled: SHAPE_i (a geometry), MEDIA, MIXED (with
-// solids), DENSE (media of other densities), COLOURED (media of several colours), GLOWS, LAMPS (how many), TEXTURES, GRIDS, TURNS, BUMPS, SKINS, OTHERS (than objects
+// solids), DENSE (media of other densities), COLOURED (media of several colours), GLOWS, LAMPS (how many), TEXTURES, TILTS, GRIDS, TURNS, BUMPS, SKINS, OTHERS (than objects
 // that draw), FAR (points from leaves). SLOTS: balls that a ray keeps; DEPTH: groups that are open at once.
 
 const float NEVER = 1e30;
 const int SMOOTH = 1;
-const int ROW = 15; // numbers of a row, in fours, the first three its map
+const int ROW = 16; // numbers of a row, in fours, the first three its map
 const int HEAD = 3; // kind of join and flags, shape, scale, usual width of a blend in widths of its own
 const int MORE = 4; // amount and frequency of its displacement, where its steps begin, how many
 const int AROUND = 5; // centre and squared radius of a ball of the world around it
@@ -31,6 +31,7 @@ const int PLACE = 10; // two: from the leaf to its picture; where that begins
 const int GRID = 12; // side and first slice of a grid, sides of a texture
 const int SKIN = 13; // how far it grows, half of its shell, how far behind that; whether displacements are behind it
 const int GLOW = 14; // linear
+const int TILT = 15; // of a texture, along z
 
 uniform int zero; // keeps compilers from unrolling
 uniform sampler2D table; // rows and steps

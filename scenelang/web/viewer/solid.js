@@ -7,7 +7,7 @@ import { groupsOf, joinsOf } from "./groups.js";
 import { axesOf, FADE, growthOf, scaledStage } from "./stage.js";
 import { aroundOf } from "./around.js";
 
-const ROW_TEXELS = 15; // as the shader has it
+const ROW_TEXELS = 16; // as the shader has it
 const LIST_WIDTH = 1024;
 const TILE_SIDE = 16; // pixels that share a list of balls, along each axis
 const CUBE_SIDE = 12; // cells along a side of the cube around a lamp
@@ -43,6 +43,11 @@ function lampsOf({ light, lights = [light] }, least = 1) {
 /** A row's colour, as far as no texture changes it. */
 function plainColour(view, row) {
   return view.materials[row.material].albedo.map((v, i) => Math.min(1, Math.max(0, v * row.colour[i])));
+}
+
+/** How a tilted texture's place changes along z. */
+function tiltOf({ tilt: [p, q] = [0, 0], stops }) {
+  return stops ? [p, q] : [p / 2, -q / 2];
 }
 
 /** The rows' numbers for the shader: ROW_TEXELS texels a row, then groups and steps of space and of colours. */
@@ -87,6 +92,7 @@ function tableOf(view, rows, joins, balls, elements, dense) {
       grid ? grid.side : 0, grid ? grid.first : 0, ...(paint ? paint.sides : [0, 0]),
       ...(row.skin ?? [0, 0, 0, 0]),
       ...(row.glow ?? [0, 0, 0]), 0,
+      ...tiltOf(row),
     ]);
   });
   const data = new Float32Array(blocks.length * 4 * ROW_TEXELS);
@@ -114,6 +120,7 @@ function featuresOf(view, rows, joins, balls) {
     GLOWS: has((row) => row.glow?.some(Boolean)),
     COLOURED: colours.size > 1,
     TEXTURES: has((row) => row.paint >= 0),
+    TILTS: has((row) => row.tilt),
     GRIDS: learned.length < shown.length,
     TURNS: balls.some((ball) => ball.rest.length > 0),
     FAR: balls.some((ball) => ball.radius > view.network.far),
