@@ -152,7 +152,7 @@ def test_completion_of_the_stage_and_the_width_of_a_blend(client: Client, uri: s
     assert labels(client, client.at(uri, "zenith = )", 9))[0] == "#d33"
     assert "none" in labels(client, client.at(uri, "light();", 6))
     assert {"camera", "light", "ground", "sky"} <= set(labels(client, client.at(uri, "();\n\n", 4)))
-    assert labels(client, client.at(uri, "camera(", 7))[:3] == ["eye =", "fov =", "target ="]
+    assert labels(client, client.at(uri, "camera(", 7))[:4] == ["exposure =", "eye =", "fov =", "target ="]
     assert labels(client, client.at(uri, "color = )", 8))[0] == "#d33"
     assert "none" in labels(client, client.at(uri, "ground(", 7))[:3]
     assert labels(client, client.at(uri, "smooth(", 7))[0] == "k ="
