@@ -10,6 +10,7 @@ thinner than that along the ray.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
+from functools import partial
 from itertools import product
 from typing import Any, NamedTuple
 
@@ -474,11 +475,10 @@ def solid_image(
         parts.append(samples.reshape(-1, 4, len(rows), per_side, width, per_side).mean((3, 5)))
         progress(rows.stop / height)
     found = np.concatenate(parts, 2)
-    image, *halves = (
-        from_light(light, stage.transparent, stage.camera.exposure) for light in (found.mean(0), *found)
-    )
+    shown = partial(from_light, transparent=stage.transparent, exposure=stage.camera.exposure)
+    image = shown(found.mean(0))
     if len(found) == 2:
-        one, other = (np.asarray(half, np.float64) for half in halves)
+        one, other = (np.asarray(shown(half), np.float64) for half in found)
         image.noise = float(np.sqrt(np.mean((one - other) ** 2))) / 2.0
     return image
 
