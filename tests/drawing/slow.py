@@ -163,3 +163,18 @@ def scale(g: Array) -> float:
     """World distance per leaf distance: the least stretch of the affine maps together."""
     last, middle = (np.linalg.inv(g[at : at + 6].reshape(2, 3)[:, :2]) for at in (5, 20))
     return float(np.linalg.svd(last @ middle, compute_uv=False)[-1])
+
+
+def distances_of_edges(a: np.ndarray, b: np.ndarray, p: np.ndarray) -> np.ndarray:
+    """Signed distances (M,) at points (M, 2) of closed lines by the starts and ends (E, 2) of their edges:
+    the nearest of all edges, and negative where the turns of the way around a point are not 0.
+    """
+    result = []
+    for point in p:
+        (ax, ay), (bx, by) = (a - point).T, (b - point).T
+        ex, ey = bx - ax, by - ay
+        share = (-(ax * ex + ay * ey) / np.maximum(ex * ex + ey * ey, 1e-300)).clip(0, 1)
+        away = np.hypot(ax + share * ex, ay + share * ey).min()
+        turns = np.arctan2(ax * by - ay * bx, ax * bx + ay * by).sum() / (2 * np.pi)
+        result.append(-away if round(turns) else away)
+    return np.array(result)

@@ -14,6 +14,7 @@ from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.metrics import psnr
 from scenelang.drawing.neural.outlines import LAST, OutlineShapes
 from scenelang.language import library
+from tests.drawing.slow import distances_of_edges
 
 PATH = library.find("std/letters")
 assert PATH is not None
@@ -27,16 +28,7 @@ def slow(name: str, p: np.ndarray) -> np.ndarray:
     a, b, c = curves_of(FONT.glyphs[name])[:, :, None].swapaxes(0, 1)
     t = np.linspace(0, 1, 201)[:, None]
     curves = (1 - t) ** 2 * a + 2 * t * (1 - t) * b + t**2 * c  # (n, 201, 2)
-    result = []
-    for point in p:
-        way = curves - point
-        (ax, ay), (bx, by) = np.moveaxis(way[:, :-1], 2, 0), np.moveaxis(way[:, 1:], 2, 0)
-        ex, ey = bx - ax, by - ay
-        share = (-(ax * ex + ay * ey) / np.maximum(ex * ex + ey * ey, 1e-18)).clip(0, 1)
-        away = np.hypot(ax + share * ex, ay + share * ey).min()
-        turns = np.arctan2(ax * by - ay * bx, ax * bx + ay * by).sum() / (2 * np.pi)
-        result.append(-away if round(turns) else away)
-    return np.array(result)
+    return distances_of_edges(curves[:, :-1].reshape(-1, 2), curves[:, 1:].reshape(-1, 2), p)
 
 
 @pytest.mark.parametrize("letter", ["A", "g", "@", "ß", "Ω", "→", ":"])

@@ -21,6 +21,7 @@ from scenelang.drawing.arrays import NUMPY
 from scenelang.drawing.exact.outline import of_element
 from scenelang.drawing.metrics import psnr
 from scenelang.drawing.neural.outlines import OutlineShapes, table_of
+from tests.drawing.slow import distances_of_edges
 
 Points = tuple[tuple[float, float], ...]
 STAR: Points = tuple((math.cos(k * 0.8 * math.pi), math.sin(k * 0.8 * math.pi)) for k in range(5))
@@ -65,18 +66,8 @@ def flattened(form: str, points: Points) -> list[tuple[float, float]]:
 
 
 def slow(line: list[tuple[float, float]], p: np.ndarray) -> np.ndarray:
-    """Signed distances (M,) at points (M, 2): the nearest of all edges, and the turns of the way around."""
-    a = np.array(line)
-    result = []
-    for point in p:
-        ax, ay = (a - point).T
-        bx, by = np.roll(ax, -1), np.roll(ay, -1)
-        ex, ey = bx - ax, by - ay
-        share = (-(ax * ex + ay * ey) / np.maximum(ex * ex + ey * ey, 1e-300)).clip(0, 1)
-        away = np.hypot(ax + share * ex, ay + share * ey).min()
-        turns = np.arctan2(ax * by - ay * bx, ax * bx + ay * by).sum() / (2 * np.pi)
-        result.append(-away if round(turns) else away)
-    return np.array(result)
+    """Signed distances (M,) at points (M, 2) of a closed line."""
+    return distances_of_edges(np.array(line), np.roll(line, -1, 0), p)
 
 
 @pytest.mark.parametrize(
