@@ -131,7 +131,7 @@ _BY_POINTS: Final = drawn_element("polygon", ((0.0, 0.0), (1.0, 0.0), (0.0, 1.0)
 
 
 def _shrunk(step: Step, radius: float) -> Step:
-    """What changes a distance by lengths, for a leaf that was made so many times smaller."""
+    """The same skin of a leaf that was made so many times smaller."""
     return steps.Shell(step.w / radius) if isinstance(step, Shell) else steps.Grow(step.r / radius)  # type: ignore[union-attr]
 
 

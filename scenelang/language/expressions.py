@@ -116,7 +116,7 @@ def folded(codes: Iterable[Code], function: Callable[..., Any], run: Run) -> Cod
 
 
 def _size(value: Any) -> int:
-    """How many numbers a vector has, or a string counts as; 0 for what takes no longer than a number."""
+    """Count the numbers of a vector, or those that a string counts as; 0 for any other value."""
     if value.__class__ is Vec:
         return int(value.count)
     return len(value) // LETTERS_AS_ITEM if value.__class__ is str else 0

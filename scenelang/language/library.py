@@ -20,7 +20,7 @@ from scenelang.language.scopes import outwards
 SHAPES: Final = "std/shapes"
 SOLIDS: Final = "std/solids"
 _CALLS: Final = {SHAPES: foreign.SHAPES, SOLIDS: foreign.SOLIDS}
-"""How the shapes of each file are called, by many names in small letters."""
+"""Calls of the shapes of each file, by many names in small letters."""
 _FOLDER: Final = Path(__file__).resolve().parent / "std"
 _RESERVED: Final = re.compile(r"std/[A-Za-z0-9_]+")
 _SUFFIXES: Final = (".nsg", ".safetensors")

@@ -46,6 +46,6 @@ FUNCTIONS: Final = {"hsv": 20, "mix": 12, "clamp": 8, "smoothstep": 8, "str": 12
 ITEM_STEPS: Final = 4
 """An operator on one number of a vector."""
 LETTERS_AS_ITEM: Final = 16
-"""How many letters of a string count as a number of a vector."""
+"""Letters of a string that count as one number of a vector."""
 FUNCTION_ITEM_STEPS: Final = 5
 """A function of the language on one number of a vector."""

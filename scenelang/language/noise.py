@@ -6,7 +6,7 @@ import math
 from typing import Final
 
 FACTORS: Final = 0x8DA6B343, 0xD8163841, 0xCB1AB31F, 0x9E3779B9
-"""Of i, j, k and the seed."""
+"""Factors of i, j, k and the seed."""
 ROUNDS: Final = (16, 0x21F0AAAD), (15, 0x735A2D97), (15, 1)
 """Each takes h to (h ^ h >> shift) * factor."""
 MASK: Final = 0xFFFFFFFF

@@ -58,7 +58,7 @@ def assert_same(p: Program, **options: str) -> None:
 
 @pytest.mark.parametrize("name", EXAMPLES)
 def test_examples_look_the_same(name: str) -> None:
-    """Of every kind; light of a sky is the kernel's alone."""
+    """Programs of every kind; light of a sky is the kernel's alone."""
     scene = nsg.load(ROOT / f"examples/{name}.nsg")
     assert_same(compile_scene(scene.model_copy(update={"canvas": (26, 19)})))
 
